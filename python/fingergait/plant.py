@@ -1,0 +1,116 @@
+"""The seam to hardware: a plant takes joint torques and gives measurements. `MujocoPlant` is the simulated one."""
+
+import json
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fingergait._core import Command, Measurement, TorquePid
+from fingergait.model import SceneModel, build_scene
+from fingergait.scenario import Scenario
+from fingergait.sensors import Sensors
+from fingergait.start import nominal_start
+
+Array = NDArray[np.float64]
+
+_CLOSING_S = 0.05  # time in which the preloaded fingers come to rest on the object before the first measurement
+
+
+class Plant(Protocol):
+    """Anything that the control step can drive at its own rate."""
+
+    def reset(self) -> Measurement:
+        """Brings the plant to its start and gives the first measurement."""
+
+    def step(self, command: Command) -> Measurement:
+        """Applies the joint torques of `command` for one control period and gives the next measurement."""
+
+    def close(self) -> None:
+        """Releases what the plant holds; the motors are off."""
+
+
+class MujocoPlant:
+    """The hand of the MJCF with the scenario's true object, at the scenario's control rate.
+
+    Within a control period the torque PID runs once a physics step on the measured motor torques. The encoders are read
+    at the end of the period; the tactile and torque sensors are one physics step older, as the simulator computes them.
+
+    Attributes
+    ----------
+    t
+        Time of the last measurement, s; the scenario's settling time lies before zero.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.scene: SceneModel = build_scene(scenario)
+        self.start = nominal_start(self.scene, scenario)
+        self.data = mujoco.MjData(self.scene.model)
+        n, m = len(self.scene.fingers), self.scene.n_joints
+        config = json.dumps(scenario.torque) if scenario.torque else None
+        self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), config)
+        self._tau = np.zeros((n, m))
+        self._tau_row = self._tau.reshape(-1)
+        self.t = 0.0
+        self.reset()
+
+    def reset(self) -> Measurement:
+        """The first measurement: the object on the palm, every tip pressing lightly, `grasp.settle` s before t = 0."""
+        scene, data = self.scene, self.data
+        mujoco.mj_resetData(scene.model, data)
+        data.qpos[:] = self.start.qpos
+        data.ctrl[scene.act] = self.start.torque
+        data.act[scene.model.actuator_actadr[scene.act]] = self.start.torque
+        for _ in range(round(_CLOSING_S / scene.model.opt.timestep)):
+            mujoco.mj_step(scene.model, data)
+        self._tau_row[:] = data.actuator_force[scene.act]
+        self._pid.reset()
+        self._steps = 0
+        self._lead = round(self.scenario.grasp.settle * self.scenario.controller.rate_hz)
+        self.t = -self._lead * self.scenario.period
+        self.sensors = Sensors(scene, data, self.scenario.sensors, self.scenario.seed)
+        return self.sensors.read(self.t)
+
+    def step(self, command: Command) -> Measurement:
+        """Drives the motors with `command` for one control period."""
+        model, data, act = self.scene.model, self.data, self.scene.act
+        if self.scenario.disturbance:
+            self._disturb()
+        desired = command.tau
+        for _ in range(self.scene.substeps):
+            data.ctrl[act] = self._pid.step(desired, self._tau).ravel()
+            mujoco.mj_step(model, data)
+            self._tau_row[:] = data.actuator_force[act]
+        self._steps += 1
+        self.t = (self._steps - self._lead) * self.scenario.period
+        return self.sensors.read(self.t)
+
+    def close(self) -> None:
+        """Switches the motors off."""
+        self.data.ctrl[:] = 0.0
+
+    @property
+    def object_pose(self) -> Array:
+        """True pose (7,) of the object's frame O in W; for the log only."""
+        first = self.scene.object_q
+        pose: Array = self.data.qpos[first : first + 7]
+        return pose
+
+    @property
+    def joint_angles(self) -> Array:
+        """True joint angles (n_fingers * n_joints,), rad; for the log only."""
+        angles: Array = self.data.qpos[self.scene.q]
+        return angles
+
+    def _disturb(self) -> None:
+        """Applies the pulses that act now; MuJoCo takes the force at the centre of mass, the scenario gives it at O."""
+        wrench = np.zeros(6)
+        for pulse in self.scenario.disturbance:
+            if pulse.at - 1e-9 <= self.t < pulse.at + pulse.duration - 1e-9:
+                wrench += [*pulse.force, *pulse.torque]
+        body = self.scene.object_body
+        arm = self.data.xpos[body] - self.data.xipos[body]
+        wrench[3:] += np.cross(arm, wrench[:3])
+        self.data.xfrc_applied[body] = wrench
