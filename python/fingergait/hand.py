@@ -1,7 +1,7 @@
 """A hand's kinematics from its MJCF: the JSON text that `_core.HandModel` reads.
 
-A finger is the chain of bodies from the world to a fingertip; a fingertip is a sphere geom whose name ends in "tip". Any
-number of fingers and of joints per finger will do, if all fingers have as many. The MJCF is the only place that
+A finger is the chain of bodies from the world to a fingertip; a fingertip is a sphere geom whose name ends in "tip".
+Any number of fingers and of joints per finger will do, if all fingers have as many. The MJCF is the only place that
 states the hand's geometry. What can't be expressed is refused in one sentence.
 """
 
@@ -58,8 +58,8 @@ def find_fingers(model: mujoco.MjModel, source: str) -> list[Finger]:
     Raises
     ------
     ConfigError
-        Where the model has no fingertips, unequal joint counts, a joint that is no limited hinge, a joint that is shared
-        or outside the fingers, a tip that is no sphere, or a joint without exactly one motor.
+        Where the model has no fingertips, unequal joint counts, a joint that is no limited hinge, a joint that is
+        shared or outside the fingers, a tip that is no sphere, or a joint without exactly one motor.
     """
     names = [model.geom(i).name for i in range(model.ngeom)]
     tips = [i for i, name in enumerate(names) if name.endswith("tip")]

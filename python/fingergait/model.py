@@ -22,9 +22,9 @@ _TORSION, _ROLLING = 0.002, 0.0001  # m: friction of a rubber tip's contact patc
 class SceneModel:
     """A compiled scene and where its parts are.
 
-    `q`, `v`, `act`: addresses of the finger joints' position, velocity and of their motors, finger by finger; `object_q`:
-    of the object's pose in qpos; `object_body`; `tips`, `links`: each finger's tip geom and last link's body;
-    `touch`: address of each tip's contact sensor.
+    `q`, `v`: addresses of the finger joints' positions and velocities, finger by finger; `act`: their motors;
+    `object_q`: address of the object's pose in qpos; `object_body`: its body; `tips`, `links`: each finger's tip geom
+    and last link's body; `touch`: address of each tip's contact sensor; `substeps`: physics steps a control step.
     """
 
     model: mujoco.MjModel

@@ -3,8 +3,8 @@
 The frame D starts at the object's first measured pose and moves by
 `X_WD(t): p = p_0 + step_t + lift(t) e_z,  R = R_y(swing(t)) R_z(yaw(t)) exp(step_r) R_0`:
 the yaw turns the object about the vertical, then the swing tilts it about the world's Y axis, so the plane of the tilt
-stays fixed in the world while the object turns in it. `lift` is a quintic in time; yaw rate and swing amplitude grow by a
-quintic blend, so that neither velocity nor acceleration jumps. Only `step` jumps: it is a test signal.
+stays fixed in the world while the object turns in it. `lift` is a quintic in time; yaw rate and swing amplitude grow by
+a quintic blend, so that neither velocity nor acceleration jumps. Only `step` jumps: it is a test signal.
 """
 
 import math

@@ -154,8 +154,8 @@ def _turn(quaternion: Array, vector: Array) -> None:
 def _view(array: Array, index: NDArray[np.intp]) -> Array:
     """`array[index]` as a view that stays current.
 
-    The joints of a finger and the fingers of a hand lie in a row in every MJCF that defines them in a row, but motors may
-    be listed in any order: then the numbers are gathered at each use.
+    Joints that an MJCF defines in a row lie in a row, but motors may be listed in any order: then the numbers are
+    gathered at each use.
     """
     first, count = int(index[0]), len(index)
     if np.array_equal(index, np.arange(first, first + count)):
