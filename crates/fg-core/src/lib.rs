@@ -5,3 +5,5 @@
 
 pub mod error;
 pub mod friction;
+pub mod manipulation;
+pub mod solver;

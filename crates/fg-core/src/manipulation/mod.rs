@@ -1,0 +1,3 @@
+//! Section IV: the manipulation controller.
+
+pub mod force;

@@ -1,0 +1,82 @@
+//! The optimality check that an answer of any solver must pass.
+
+use super::qp::{dot, ForceQp, Forces, WIDTH};
+
+/// How far forces and multipliers are from satisfying the KKT conditions of [`ForceQp`]. Everything is in newtons.
+///
+/// With H = s I + alpha3 G'G, s = alpha1 + alpha2, and signed multipliers mu_i (positive: the lower bound pushes,
+/// negative: the upper bound):
+///
+/// - `stationarity` = `|f - prior - (alpha3/s) G'(F_des - G f) - sum mu_i a_i|_2`. As H >= s I, this alone moves the
+///   minimiser by no more than itself.
+/// - `primal` = largest violation of a row.
+/// - `complementarity` = largest `min(|mu_i|, |slack of the bound that mu_i's sign names|)`. A multiplier that pushes
+///   at a bound which does not exist counts in full, so that wrong dual signs are covered.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Residual {
+    /// N.
+    pub stationarity: f64,
+    /// N.
+    pub primal: f64,
+    /// N.
+    pub complementarity: f64,
+}
+
+impl Residual {
+    /// The largest of the three, N; infinite where any number is not finite.
+    pub fn worst(&self) -> f64 {
+        let sum = self.stationarity + self.primal + self.complementarity;
+        if sum.is_finite() {
+            self.stationarity.max(self.primal).max(self.complementarity)
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// Largest violation of a row by `f`, N.
+pub fn violation(qp: &ForceQp, f: &Forces) -> f64 {
+    let mut worst = 0.0_f64;
+    for row in &qp.rows {
+        let along = qp.along(row, f);
+        worst = worst.max(row.lower - along).max(along - row.upper);
+    }
+    worst
+}
+
+/// Gradient of the Lagrangian over s, N: `f - prior - (alpha3/s) G'(F_des - G f) - sum mu_i a_i`.
+pub fn gradient(qp: &ForceQp, f: &Forces, multipliers: impl Iterator<Item = (usize, f64)>) -> Forces {
+    let psi = qp.psi(f);
+    let gain = qp.alpha3 / qp.s;
+    let mut gradient = [0.0; WIDTH];
+    for (row, y) in qp.G.iter().zip(&psi) {
+        for (r, g) in gradient.iter_mut().zip(row) {
+            *r -= gain * y * g;
+        }
+    }
+    for ((r, x), p) in gradient.iter_mut().zip(f).zip(&qp.prior) {
+        *r += x - p;
+    }
+    for (index, mu) in multipliers {
+        qp.add_row(&qp.rows[index], -mu, &mut gradient);
+    }
+    gradient
+}
+
+/// The residual at forces `f` with multipliers given as (row, mu), mu = 0 for all other rows.
+pub fn residual(
+    qp: &ForceQp,
+    f: &Forces,
+    multipliers: impl Iterator<Item = (usize, f64)> + Clone,
+) -> Residual {
+    let gradient = gradient(qp, f, multipliers.clone());
+    let mut complementarity = 0.0_f64;
+    for (index, mu) in multipliers {
+        let row = &qp.rows[index];
+        let along = qp.along(row, f);
+        let slack = if mu > 0.0 { along - row.lower } else { row.upper - along };
+        complementarity = complementarity.max(mu.abs().min(slack.abs()));
+    }
+    let stationarity = dot(&gradient, &gradient).sqrt();
+    Residual { stationarity, primal: violation(qp, f), complementarity }
+}
