@@ -126,7 +126,13 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: mujoco.MjModel, f
     body.add_freejoint(name=OBJECT)
     body.mass = scenario.object.mass * truth.mass_scale
     body.ipos = np.array(truth.com_offset)
-    body.inertia = shape.inertia(scenario.object.mass) * np.asarray(truth.inertia_scale)
+    inertia = shape.inertia(scenario.object.mass) * np.asarray(truth.inertia_scale)
+    if 2.0 * inertia.max() > inertia.sum():
+        found = ", ".join(f"{x:.3g}" for x in inertia)
+        raise ConfigError(
+            f"truth.inertia_scale: expected moments of which none exceeds the other two together, found {found} kg m^2"
+        )
+    body.inertia = inertia
     body.explicitinertial = True
     geom = shape.add_to(spec, body, OBJECT)
     geom.contype, geom.conaffinity = _OBJECT, _FINGERS | _PALM | _OBJECT

@@ -1,6 +1,5 @@
 """The seam to hardware: a plant takes joint torques and gives measurements. `MujocoPlant` is the simulated one."""
 
-import json
 from typing import Protocol
 
 import mujoco
@@ -8,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import Command, Measurement, TorquePid
-from fingergait.model import SceneModel, build_scene
+from fingergait.config import core_config
+from fingergait.model import SceneModel, build_scene, torque_limits
 from fingergait.scenario import Scenario
 from fingergait.sensors import Sensors
 from fingergait.start import nominal_start
@@ -39,6 +39,8 @@ class MujocoPlant:
 
     Attributes
     ----------
+    config
+        JSON of the core's configuration that fits this plant.
     t
         Time of the last measurement, s; the scenario's settling time lies before zero.
     """
@@ -49,8 +51,8 @@ class MujocoPlant:
         self.start = nominal_start(self.scene, scenario)
         self.data = mujoco.MjData(self.scene.model)
         n, m = len(self.scene.fingers), self.scene.n_joints
-        config = json.dumps(scenario.torque) if scenario.torque else None
-        self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), config)
+        self.config = core_config(scenario, float(torque_limits(self.scene).min()))
+        self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), self.config)
         self._tau = np.zeros((n, m))
         self._tau_row = self._tau.reshape(-1)
         self.t = 0.0

@@ -1,0 +1,26 @@
+"""The compiled core's configuration for a scenario. Defaults and ranges are the core's own: none is restated here."""
+
+import json
+from typing import Any
+
+from fingergait.scenario import Scenario
+
+
+def core_config(scenario: Scenario, tau_max: float) -> str:
+    """JSON for `_core.DualStagePlanner` and `_core.TorquePid`.
+
+    The scenario's own keys set the control rate, the nominal mass and the assumed friction, and `tau_max`, N m, of the
+    hand's weakest motor sets the torque limit; what the tables `gait`, `force`, `robust`, `torque` and `safety` say
+    goes before.
+    """
+    config: dict[str, Any] = {
+        "rate_hz": scenario.controller.rate_hz,
+        "mass": scenario.object.mass,
+        "gait": scenario.gait,
+        "force": {"friction": scenario.controller.friction, "tau_max": tau_max, **scenario.force},
+        "robust": scenario.robust,
+        "torque": scenario.torque,
+    }
+    if scenario.safety:
+        config["safety"] = scenario.safety
+    return json.dumps(config)
