@@ -1,5 +1,6 @@
 //! The one error type of the crate: a caller's mistake, named by field, expected and found.
 
+use std::fmt::Display;
 use thiserror::Error;
 
 /// A caller's mistake. Numerical trouble is not an error: it is reported in [`crate::signals::Diagnostics`].
@@ -37,17 +38,18 @@ pub enum Error {
     },
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "callers pass temporaries")]
 impl Error {
     /// A [`Error::Config`] from displayable parts.
-    pub fn config(field: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
+    pub fn config(field: impl Into<String>, expected: impl Into<String>, found: impl Display) -> Self {
         Self::Config { field: field.into(), expected: expected.into(), found: found.to_string() }
     }
     /// A [`Error::Shape`] from displayable parts.
-    pub fn shape(field: impl Into<String>, expected: impl ToString, found: impl ToString) -> Self {
+    pub fn shape(field: impl Into<String>, expected: impl Display, found: impl Display) -> Self {
         Self::Shape { field: field.into(), expected: expected.to_string(), found: found.to_string() }
     }
     /// A [`Error::Artifact`] from displayable parts.
-    pub fn artifact(field: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Self {
+    pub fn artifact(field: impl Into<String>, expected: impl Into<String>, found: impl Display) -> Self {
         Self::Artifact { field: field.into(), expected: expected.into(), found: found.to_string() }
     }
 }

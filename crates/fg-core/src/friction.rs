@@ -22,13 +22,23 @@ impl FrictionPyramid {
         if !(mu.is_finite() && mu > 0.0) {
             return Err(Error::config("friction", "a finite number > 0", mu));
         }
-        let edges: Vec<_> = (0..n_edges)
-            .map(|k| {
-                let angle = std::f64::consts::TAU * k as f64 / n_edges as f64;
-                Vector3::new(mu * angle.cos(), mu * angle.sin(), 1.0)
-            })
-            .collect();
+        let edges: Vec<_> = (0..n_edges).map(|k| inscribed_edge(mu, k, n_edges)).collect();
         Self::from_edges(&edges)
+    }
+
+    /// Makes this the inscribed pyramid of friction coefficient `mu`, with as many edges as now; allocates nothing.
+    pub fn set_friction(&mut self, mu: f64) -> Result<(), Error> {
+        if !(mu.is_finite() && mu > 0.0) {
+            return Err(Error::config("friction", "a finite number > 0", mu));
+        }
+        let m = self.edges.len();
+        for (k, edge) in self.edges.iter_mut().enumerate() {
+            *edge = inscribed_edge(mu, k, m);
+        }
+        for k in 0..m {
+            self.facets[k] = self.edges[k].cross(&self.edges[(k + 1) % m]).normalize();
+        }
+        Ok(())
     }
 
     /// The pyramid spanned by `edges`, in anticlockwise order seen against the normal.
@@ -65,5 +75,22 @@ impl FrictionPyramid {
     /// True where the force `f` lies in the pyramid, within `tolerance` newtons.
     pub fn contains(&self, f: &Vector3<f64>, tolerance: f64) -> bool {
         self.facets.iter().all(|n| n.dot(f) >= -tolerance)
+    }
+}
+
+fn inscribed_edge(mu: f64, k: usize, n_edges: usize) -> Vector3<f64> {
+    let angle = std::f64::consts::TAU * k as f64 / n_edges as f64;
+    Vector3::new(mu * angle.cos(), mu * angle.sin(), 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changing_the_friction_equals_a_fresh_pyramid() {
+        let mut pyramid = FrictionPyramid::inscribed(0.8, 8).unwrap();
+        pyramid.set_friction(0.5).unwrap();
+        assert_eq!(pyramid, FrictionPyramid::inscribed(0.5, 8).unwrap());
     }
 }
