@@ -1,0 +1,107 @@
+//! The velocity-level gait planner: the linear program (4), at each step.
+
+use crate::config::GaitConfig;
+use crate::gait::quality::QualityModel;
+use crate::grasp::Scene;
+use crate::hand::HandModel;
+use crate::solver::knapsack::gait_lp;
+
+/// What the LP found at one step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct GaitRate {
+    /// Q-dot at the solution, 1/s.
+    pub Q_dot: f64,
+    /// False where no velocity meets all constraints; then (4c) is met as well as the box allows.
+    pub feasible: bool,
+}
+
+/// Solves eq. (4) for the free finger. Allocated once.
+#[derive(Debug, Clone)]
+pub struct GaitPlanner {
+    config: GaitConfig,
+    /// Largest change of a joint velocity in one step, rad/s.
+    sigma: f64,
+    /// Desired joint velocities of the free finger, rad/s: qd_des,k.
+    qd_des: Vec<f64>,
+    c: Vec<f64>,
+    a: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    centre: Vec<f64>,
+}
+
+impl GaitPlanner {
+    /// A planner for `hand` at the control period `dt`.
+    pub fn new(hand: &HandModel, config: &GaitConfig, dt: f64) -> Self {
+        let zeros = vec![0.0; hand.n_joints()];
+        Self {
+            // The paper's sigma belongs to its 2 ms; sigma / T_s is the acceleration limit that is meant.
+            sigma: config.sigma * dt / 0.002,
+            config: config.clone(),
+            qd_des: zeros.clone(),
+            c: zeros.clone(),
+            a: zeros.clone(),
+            lower: zeros.clone(),
+            upper: zeros.clone(),
+            centre: zeros,
+        }
+    }
+
+    /// Desired joint velocities of the free finger, rad/s.
+    pub fn qd_des(&self) -> &[f64] {
+        &self.qd_des
+    }
+
+    /// Stops the finger.
+    pub fn reset(&mut self) {
+        self.qd_des.fill(0.0);
+    }
+
+    /// Moves `qd_des` to the solution of (4) for finger `k`.
+    pub fn update(&mut self, k: usize, quality: &QualityModel, scene: &Scene<'_>) -> GaitRate {
+        quality.rate_coefficients(k, scene, &self.qd_des, &mut self.c);
+        self.constrain_to_surface(k, scene);
+        self.rate_box();
+        let outcome = gait_lp(&self.c, &self.a, &self.lower, &self.upper, &mut self.qd_des);
+        GaitRate { Q_dot: outcome.value, feasible: outcome.feasible }
+    }
+
+    /// The best Q-dot that finger `k` could reach without the acceleration limit: what freeing it promises, 1/s.
+    pub fn potential(&mut self, k: usize, quality: &QualityModel, scene: &Scene<'_>) -> f64 {
+        self.centre.fill(0.0);
+        quality.rate_coefficients(k, scene, &self.centre, &mut self.c);
+        self.constrain_to_surface(k, scene);
+        self.lower.fill(-self.config.qd_max);
+        self.upper.fill(self.config.qd_max);
+        gait_lp(&self.c, &self.a, &self.lower, &self.upper, &mut self.centre).value
+    }
+
+    /// The row n_pk^T J of (4c).
+    fn constrain_to_surface(&mut self, k: usize, scene: &Scene<'_>) {
+        let contact = scene.grasp.contact(k);
+        for (i, a) in self.a.iter_mut().enumerate() {
+            *a = contact.n_W.dot(&scene.state.jacobian_column(k, i, &contact.p_WC));
+        }
+    }
+
+    /// The box of (4b) and (4d). The contact moves on the surface, so the tangent plane turns and the box around the
+    /// previous velocity may miss it; around that velocity's projection on the plane it never does.
+    fn rate_box(&mut self) {
+        self.centre.copy_from_slice(&self.qd_des);
+        if self.config.project_rate_box {
+            let aa: f64 = self.a.iter().map(|a| a * a).sum();
+            let av: f64 = self.a.iter().zip(&self.qd_des).map(|(a, v)| a * v).sum();
+            if aa > 1e-12 {
+                for (centre, a) in self.centre.iter_mut().zip(&self.a) {
+                    *centre -= a * av / aa;
+                }
+            }
+        }
+        let limit = self.config.qd_max;
+        for ((lower, upper), centre) in self.lower.iter_mut().zip(&mut self.upper).zip(&self.centre) {
+            let centre = centre.clamp(-limit, limit);
+            *lower = (centre - self.sigma).max(-limit);
+            *upper = (centre + self.sigma).min(limit);
+        }
+    }
+}
