@@ -1,3 +1,6 @@
-//! Section IV: the manipulation controller.
+//! Section IV: from the pose error to contact forces.
 
 pub mod force;
+pub mod lti;
+pub mod robust;
+pub mod slip;
