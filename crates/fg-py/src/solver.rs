@@ -108,8 +108,8 @@ impl ForceOptimizer {
         };
         if J.ncols() != self.n_q {
             // The number of joints is first known here.
-            self.core =
-                force::ForceOptimizer::new(&self.pyramids, J.ncols(), self.settings.clone()).map_err(to_py)?;
+            self.core = force::ForceOptimizer::new(&self.pyramids, J.ncols(), self.settings.clone())
+                .map_err(to_py)?;
             self.n_q = J.ncols();
         }
         let problem = force::ForceProblem {

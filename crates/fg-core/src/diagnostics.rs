@@ -1,0 +1,146 @@
+//! What a control step decided, and why, as plain numbers.
+
+use crate::gait::planner::GaitRate;
+use crate::gait::quality::Quality;
+use crate::gait::supervisor::{GaitEnd, Phase};
+use crate::hand::HandModel;
+use crate::manipulation::force::{ForceStatus, SolverUsed};
+use nalgebra::{DVector, Vector6};
+
+/// The figures of one control step. Allocated once, overwritten by each step; holds no time measurement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostics {
+    /// Phase of the gait.
+    pub phase: Phase,
+    /// Finger whose gait is under way.
+    pub free_finger: Option<usize>,
+    /// Gaits begun since the start.
+    pub gaits: u64,
+    /// Why the last gait ended.
+    pub last_end: GaitEnd,
+    /// Grasp quality, eq. (1).
+    pub quality: Quality,
+    /// delta_Q; NaN before the first grasp.
+    pub threshold: f64,
+    /// Value of the gait LP, zero outside a slide.
+    pub rate: GaitRate,
+    /// Pose error against the filtered reference [m; rad].
+    pub e: Vector6<f64>,
+    /// Desired wrench [N; N m] at Oo in W.
+    pub F_des: Vector6<f64>,
+    /// What the force optimiser could not deliver: Psi = F_des - G f.
+    pub psi: Vector6<f64>,
+    /// Contact forces in their contact frames, N.
+    pub f: DVector<f64>,
+    /// Measured normal forces, N.
+    pub f_n: DVector<f64>,
+    /// Heights of the contacts over the first grasp's mean, in the object's frame, m.
+    pub heights: DVector<f64>,
+    /// Slip speeds of the holding fingers, m/s.
+    pub slip: DVector<f64>,
+    /// Times that slip has lowered the assumed friction.
+    pub slips: u64,
+    /// Desired joint velocities of the free finger, rad/s.
+    pub qd_des: DVector<f64>,
+    /// Torque command, N m.
+    pub tau: DVector<f64>,
+    /// Whether the force optimum is certified.
+    pub status: ForceStatus,
+    /// Who solved the QP.
+    pub solver: SolverUsed,
+    /// KKT residual of the QP.
+    pub kkt: f64,
+    /// Iterations of the QP solver.
+    pub iterations: usize,
+    /// Friction coefficient that the force optimiser assumes.
+    pub friction: f64,
+}
+
+impl Diagnostics {
+    /// Diagnostics for `hand`, all zero.
+    pub fn new(n_fingers: usize, n_joints: usize) -> Self {
+        let zeros = DVector::zeros;
+        Self {
+            phase: Phase::Hold,
+            free_finger: None,
+            gaits: 0,
+            last_end: GaitEnd::None,
+            quality: Quality::default(),
+            threshold: f64::NAN,
+            rate: GaitRate { Q_dot: 0.0, feasible: true },
+            e: Vector6::zeros(),
+            F_des: Vector6::zeros(),
+            psi: Vector6::zeros(),
+            f: zeros(3 * n_fingers),
+            f_n: zeros(n_fingers),
+            heights: zeros(n_fingers),
+            slip: zeros(n_fingers),
+            slips: 0,
+            qd_des: zeros(n_joints),
+            tau: zeros(n_fingers * n_joints),
+            status: ForceStatus::Solved,
+            solver: SolverUsed::ActiveSet,
+            kkt: 0.0,
+            iterations: 0,
+            friction: 0.0,
+        }
+    }
+
+    /// Shows every figure in a fixed order: a name, and one value or a vector of them.
+    fn visit(&self, mut show: impl FnMut(&'static str, &[f64])) {
+        show("phase", &[f64::from(self.phase as u8)]);
+        show("free_finger", &[self.free_finger.map_or(-1.0, |k| k as f64)]);
+        show("gaits", &[self.gaits as f64]);
+        show("gait_end", &[f64::from(self.last_end as u8)]);
+        show("Q", &[self.quality.Q]);
+        show("Q_o", &[self.quality.Q_o]);
+        show("Q_h", &[self.quality.Q_h]);
+        show("threshold", &[self.threshold]);
+        show("Q_dot", &[self.rate.Q_dot]);
+        show("lp_feasible", &[f64::from(u8::from(self.rate.feasible))]);
+        show("e", self.e.as_slice());
+        show("F_des", self.F_des.as_slice());
+        show("psi", self.psi.as_slice());
+        show("f", self.f.as_slice());
+        show("f_n", self.f_n.as_slice());
+        show("height", self.heights.as_slice());
+        show("slip", self.slip.as_slice());
+        show("slips", &[self.slips as f64]);
+        show("qd_des", self.qd_des.as_slice());
+        show("tau_des", self.tau.as_slice());
+        show("status", &[f64::from(self.status as u8)]);
+        show("solver", &[f64::from(self.solver as u8)]);
+        show("kkt", &[self.kkt]);
+        show("iterations", &[self.iterations as f64]);
+        show("friction", &[self.friction]);
+    }
+
+    /// Names of the numbers that [`Diagnostics::row`] writes, in order; elements of vectors end in their index.
+    pub fn columns(n_fingers: usize, n_joints: usize) -> Vec<String> {
+        let mut names = Vec::new();
+        Self::new(n_fingers.min(HandModel::MAX_FINGERS), n_joints.min(HandModel::MAX_JOINTS)).visit(
+            |name, values| match values.len() {
+                1 => names.push(name.to_owned()),
+                n => names.extend((0..n).map(|i| format!("{name}_{i}"))),
+            },
+        );
+        names
+    }
+
+    /// Appends every figure of the step to `row`.
+    pub fn row(&self, row: &mut Vec<f64>) {
+        self.visit(|_, values| row.extend_from_slice(values));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_has_as_many_numbers_as_columns() {
+        let mut row = Vec::new();
+        Diagnostics::new(4, 3).row(&mut row);
+        assert_eq!(row.len(), Diagnostics::columns(4, 3).len());
+    }
+}

@@ -1,0 +1,206 @@
+//! `DualStagePlanner` with its signals.
+
+use crate::controller::Controller;
+use crate::convert::{array1, array2, flat, pose, vector};
+use crate::cpu_clock::ThreadClock;
+use crate::errors::to_py;
+use crate::hand::HandModel;
+use fg_core::config::Config;
+use fg_core::diagnostics::Diagnostics as CoreDiagnostics;
+use fg_core::dual_stage::DualStagePlanner as Core;
+use fg_core::signals::{Measurement as CoreMeasurement, Reference as CoreReference, Tactile};
+use nalgebra::{DVector, Vector3, Vector6};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// What the sensors say at one instant: no velocity, no mass, no mesh.
+#[pyclass(frozen, module = "fingergait._core")]
+pub struct Measurement(CoreMeasurement);
+
+#[pymethods]
+impl Measurement {
+    #[new]
+    fn new(
+        t: f64,
+        q: PyArrayLike2<'_, f64, AllowTypeChange>,
+        tau: PyArrayLike2<'_, f64, AllowTypeChange>,
+        pose: PyArrayLike1<'_, f64, AllowTypeChange>,
+        contact_place: PyArrayLike2<'_, f64, AllowTypeChange>,
+        contact_force: PyArrayLike1<'_, f64, AllowTypeChange>,
+    ) -> PyResult<Self> {
+        let shape = (q.shape()[0], q.shape()[1]);
+        let place = flat("contact_place", &contact_place, (shape.0, 3))?;
+        let force = vector("contact_force", &contact_force, shape.0)?;
+        let tactile = place.chunks_exact(3).zip(force);
+        Ok(Self(CoreMeasurement {
+            t,
+            q: DVector::from_vec(flat("q", &q, shape)?),
+            tau: DVector::from_vec(flat("tau", &tau, shape)?),
+            X_WO: self::pose("pose", &pose)?,
+            tactile: tactile.map(|(p, f_n)| Tactile { p_FC: Vector3::new(p[0], p[1], p[2]), f_n }).collect(),
+        }))
+    }
+}
+
+/// Desired object pose (7,) in W, with the desired twist (6,) [linear; angular] in W, zero by default.
+#[pyclass(frozen, module = "fingergait._core")]
+pub struct Reference(CoreReference);
+
+#[pymethods]
+impl Reference {
+    #[new]
+    #[pyo3(signature = (pose, twist=None))]
+    fn new(
+        pose: PyArrayLike1<'_, f64, AllowTypeChange>,
+        twist: Option<PyArrayLike1<'_, f64, AllowTypeChange>>,
+    ) -> PyResult<Self> {
+        let V_WD = match twist {
+            Some(twist) => Vector6::from_vec(vector("twist", &twist, 6)?),
+            None => Vector6::zeros(),
+        };
+        Ok(Self(CoreReference { X_WD: self::pose("pose", &pose)?, V_WD }))
+    }
+}
+
+/// The joint torques to track until the next step.
+#[pyclass(frozen, module = "fingergait._core")]
+pub struct Command {
+    tau: DVector<f64>,
+    n_joints: usize,
+}
+
+#[pymethods]
+impl Command {
+    /// Desired joint torques, (n_fingers, n_joints), N m.
+    #[getter]
+    fn tau<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let n = self.n_joints;
+        array2(py, (self.tau.len() / n, n), |j, i| self.tau[j * n + i])
+    }
+}
+
+/// What the step decided and why.
+#[pyclass(frozen, module = "fingergait._core")]
+pub struct Diagnostics {
+    core: CoreDiagnostics,
+    step_ns: u64,
+}
+
+#[pymethods]
+impl Diagnostics {
+    /// "hold" or "gait".
+    #[getter]
+    fn mode(&self) -> &'static str {
+        if self.core.free_finger.is_some() {
+            "gait"
+        } else {
+            "hold"
+        }
+    }
+
+    /// Phase of the gait: "hold", "unload", "slide", "press" or "load".
+    #[getter]
+    fn phase(&self) -> &'static str {
+        self.core.phase.as_str()
+    }
+
+    /// Index of the finger whose gait is under way.
+    #[getter]
+    fn free_finger(&self) -> Option<usize> {
+        self.core.free_finger
+    }
+
+    /// Whether the force optimum is certified: "solved" or "held".
+    #[getter]
+    fn status(&self) -> &'static str {
+        self.core.status.as_str()
+    }
+
+    /// Who solved the force QP.
+    #[getter]
+    fn solver(&self) -> &'static str {
+        self.core.solver.as_str()
+    }
+
+    /// Grasp quality Q, eq. (1).
+    #[getter]
+    fn quality(&self) -> f64 {
+        self.core.quality.Q
+    }
+
+    /// Thread CPU time of this control step inside the compiled core, ns.
+    #[getter]
+    fn step_ns(&self) -> u64 {
+        self.step_ns
+    }
+
+    /// Names of the numbers that `row` gives, in order.
+    #[staticmethod]
+    fn columns(n_fingers: usize, n_joints: usize) -> Vec<String> {
+        CoreDiagnostics::columns(n_fingers, n_joints)
+    }
+
+    /// Every figure of this step as one row, for a log. Deterministic: holds no time measurement.
+    fn row<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let mut row = Vec::with_capacity(128);
+        self.core.row(&mut row);
+        array1(py, &row)
+    }
+}
+
+/// The whole control step: grasp quality, gait planner, robust controller, force optimiser.
+#[pyclass(module = "fingergait._core")]
+pub struct DualStagePlanner(Core);
+
+#[pymethods]
+impl DualStagePlanner {
+    #[new]
+    #[pyo3(signature = (hand, controller, config=None))]
+    fn new(hand: &HandModel, controller: &Controller, config: Option<&str>) -> PyResult<Self> {
+        let config = config.map_or_else(|| Ok(Config::default()), Config::from_json).map_err(to_py)?;
+        Core::new(hand.0.clone(), controller.0.clone(), config).map(Self).map_err(to_py)
+    }
+
+    /// The configuration in use.
+    #[getter]
+    fn config<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        config_dict(py, self.0.config())
+    }
+
+    /// The torques to track until the next step, and what was decided.
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        measurement: &Measurement,
+        reference: &Reference,
+    ) -> PyResult<(Command, Diagnostics)> {
+        let planner = &mut self.0;
+        let (outcome, step_ns) = py.detach(|| {
+            let clock = ThreadClock::start();
+            let outcome = planner.step(&measurement.0, &reference.0).cloned();
+            (outcome, clock.elapsed_ns())
+        });
+        let command = outcome.map_err(to_py)?;
+        let n_joints = self.0.hand().n_joints();
+        let diagnostics = Diagnostics { core: self.0.diagnostics().clone(), step_ns };
+        Ok((Command { tau: command.tau, n_joints }, diagnostics))
+    }
+
+    /// Returns to the state after construction.
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+}
+
+/// The default `Config`: the paper's parameter list.
+#[pyfunction]
+pub fn default_config(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+    config_dict(py, &Config::default())
+}
+
+fn config_dict<'py>(py: Python<'py>, config: &Config) -> PyResult<Bound<'py, PyDict>> {
+    let json = serde_json::to_string(config)
+        .map_err(|e| to_py(fg_core::error::Error::config("config", "a configuration", e)))?;
+    Ok(py.import("json")?.call_method1("loads", (json,))?.cast_into::<PyDict>()?)
+}

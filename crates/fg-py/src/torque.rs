@@ -1,0 +1,44 @@
+//! `TorquePid`.
+
+use crate::convert::like;
+use crate::errors::to_py;
+use fg_core::config::Config;
+use fg_core::torque::TorquePid as Core;
+use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn};
+use pyo3::prelude::*;
+
+/// Joint torque tracking at the faster torque rate.
+#[pyclass(module = "fingergait._core")]
+pub struct TorquePid {
+    core: Core,
+    motor: Vec<f64>,
+}
+
+#[pymethods]
+impl TorquePid {
+    #[new]
+    #[pyo3(signature = (n_joints_total, dt, config=None))]
+    fn new(n_joints_total: usize, dt: f64, config: Option<&str>) -> PyResult<Self> {
+        let config = config.map_or_else(|| Ok(Config::default()), Config::from_json).map_err(to_py)?;
+        let core = Core::new(n_joints_total, dt, &config.torque, &config.force).map_err(to_py)?;
+        Ok(Self { core, motor: vec![0.0; n_joints_total] })
+    }
+
+    /// Motor torques that drive the measured torques `tau` to `tau_des`; same shape as `tau_des`.
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        tau_des: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
+        tau: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let wanted: Vec<f64> = tau_des.as_array().iter().copied().collect();
+        let measured: Vec<f64> = tau.as_array().iter().copied().collect();
+        self.core.step(&wanted, &measured, &mut self.motor).map_err(to_py)?;
+        Ok(like(py, &tau_des, &self.motor))
+    }
+
+    /// Forgets the past.
+    fn reset(&mut self) {
+        self.core.reset();
+    }
+}
