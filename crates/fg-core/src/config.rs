@@ -82,6 +82,10 @@ pub struct GaitConfig {
     pub K_f: f64,
     /// Desired normal force of a sliding finger, N. The paper: "a constant small force".
     pub f_des: f64,
+    /// Let (4c) follow the desired motion of the surface. Deviation: the paper's surface stands still.
+    pub follow_surface: bool,
+    /// Speed towards the surface of a finger that has lost it, m/s. Deviation: the paper relies on the force term.
+    pub approach_speed: f64,
     /// Time constant of the filter on the measured normal force, s.
     pub force_filter: f64,
     /// delta_Q = Q(first grasp) - margin, eq. (1).
@@ -123,6 +127,8 @@ impl Default for GaitConfig {
             K_v: 0.05,
             K_f: 1.5,
             f_des: 0.15,
+            follow_surface: true,
+            approach_speed: 0.02,
             force_filter: 0.02,
             threshold_margin: 8e-4,
             unload_time: 0.04,
@@ -263,6 +269,7 @@ impl Config {
             ("gait.K_v", g.K_v, 0.0, 100.0),
             ("gait.K_f", g.K_f, 0.0, 100.0),
             ("gait.f_des", g.f_des, 0.0, 100.0),
+            ("gait.approach_speed", g.approach_speed, 0.0, 1.0),
             ("gait.force_filter", g.force_filter, 0.0, 10.0),
             ("gait.threshold_margin", g.threshold_margin, -1e3, 1e3),
             ("gait.unload_time", g.unload_time, 0.0, 10.0),

@@ -56,6 +56,7 @@ macro_rules! scene {
             grasp: &$planner.grasp,
             state: &$planner.state,
             X_WO: &$measurement.X_WO,
+            V_WD: $planner.robust.twist(),
             q: $measurement.q.as_slice(),
         }
     };
@@ -313,6 +314,8 @@ impl DualStagePlanner {
         let scene = scene!(self, measurement);
         if self.supervisor.phase() == Phase::Slide {
             self.diagnostics.rate = self.planner.update(k, &self.quality, &scene);
+        } else {
+            self.planner.press(k, &scene);
         }
         let (qd_des, f_des) = (self.planner.qd_des(), self.config.gait.f_des);
         self.velocity_force.update(k, &scene, qd_des, f_des, &mut self.tau_free);

@@ -3,7 +3,7 @@
 use crate::hand::{HandModel, HandState};
 use crate::signals::Measurement;
 use crate::spatial::contact_frame;
-use nalgebra::{DMatrix, Isometry3, Matrix3, Unit, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Unit, Vector3, Vector6};
 
 /// One fingertip on, or near, the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +31,8 @@ pub struct Scene<'a> {
     pub state: &'a HandState,
     /// Pose of the object in W.
     pub X_WO: &'a Isometry3<f64>,
+    /// Desired twist of the object [linear; angular] in W: what its surface is meant to do.
+    pub V_WD: &'a Vector6<f64>,
     /// Joint angles, finger by finger, rad.
     pub q: &'a [f64],
 }

@@ -84,7 +84,7 @@ proptest! {
         let config =
             GaitConfig { q_thres: 0.99, w_z: 0.0, plane: QualityPlane::Object, ..GaitConfig::default() };
         let mut quality = QualityModel::new(&hand, &config);
-        let scene = Scene { grasp: &grasp, state: &state, X_WO: &measurement.X_WO, q: &q };
+        let scene = Scene { grasp: &grasp, state: &state, X_WO: &measurement.X_WO, V_WD: &Vector6::zeros(), q: &q };
         quality.set_first_grasp(&scene);
         let mut c = [0.0; 3];
         quality.rate_coefficients(k, &scene, &[0.0; 3], &mut c);
@@ -99,7 +99,7 @@ proptest! {
             // The contact is a point of the tip: it keeps its place on the tip.
             let (state, grasp) = grasped(&moved);
             let scene =
-                Scene { grasp: &grasp, state: &state, X_WO: &moved.X_WO, q: moved.q.as_slice() };
+                Scene { grasp: &grasp, state: &state, X_WO: &moved.X_WO, V_WD: &Vector6::zeros(), q: moved.q.as_slice() };
             quality.quality(&scene).Q
         };
         let numeric = (at(1.0) - at(-1.0)) / (2.0 * step);
@@ -113,7 +113,7 @@ fn a_square_grasp_has_the_area_of_the_square() {
     let measurement = common::measurement(&hand, &common::grasp_angles(4), 1.0);
     let (state, grasp) = grasped(&measurement);
     let q = measurement.q.as_slice();
-    let scene = Scene { grasp: &grasp, state: &state, X_WO: &measurement.X_WO, q };
+    let scene = Scene { grasp: &grasp, state: &state, X_WO: &measurement.X_WO, V_WD: &Vector6::zeros(), q };
     let radius = grasp.contact(0).p_WC.x;
     for plane in [QualityPlane::Object, QualityPlane::Contacts] {
         let config = GaitConfig { plane, ..GaitConfig::default() };

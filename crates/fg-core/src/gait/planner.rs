@@ -5,6 +5,7 @@ use crate::gait::quality::QualityModel;
 use crate::grasp::Scene;
 use crate::hand::HandModel;
 use crate::solver::knapsack::gait_lp;
+use crate::spatial::{angular, linear};
 
 /// What the LP found at one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -58,12 +59,38 @@ impl GaitPlanner {
     }
 
     /// Moves `qd_des` to the solution of (4) for finger `k`.
+    ///
+    /// Deviation: (4c) reads n^T J qd = n^T v with v the desired velocity of the surface, which turns and tilts under the
+    /// finger, instead of zero; a finger that has lost the surface moves towards it at the approach speed. The tangential
+    /// part of qd is what the LP finds; the normal part is the smallest that follows the surface.
     pub fn update(&mut self, k: usize, quality: &QualityModel, scene: &Scene<'_>) -> GaitRate {
         quality.rate_coefficients(k, scene, &self.qd_des, &mut self.c);
         self.constrain_to_surface(k, scene);
         self.rate_box();
         let outcome = gait_lp(&self.c, &self.a, &self.lower, &self.upper, &mut self.qd_des);
+        self.follow_surface(k, scene);
         GaitRate { Q_dot: outcome.value, feasible: outcome.feasible }
+    }
+
+    /// Moves `qd_des` to the velocity that follows the surface, or finds it again, and does nothing else.
+    pub fn press(&mut self, k: usize, scene: &Scene<'_>) {
+        self.constrain_to_surface(k, scene);
+        self.qd_des.fill(0.0);
+        self.follow_surface(k, scene);
+    }
+
+    fn follow_surface(&mut self, k: usize, scene: &Scene<'_>) {
+        let contact = scene.grasp.contact(k);
+        let arm = contact.p_WC - scene.X_WO.translation.vector;
+        let surface = linear(scene.V_WD) + angular(scene.V_WD).cross(&arm);
+        let follow = if self.config.follow_surface { contact.n_W.dot(&surface) } else { 0.0 };
+        let approach = if contact.touching { 0.0 } else { self.config.approach_speed };
+        let aa: f64 = self.a.iter().map(|a| a * a).sum();
+        let scale = if aa > 1e-12 { (follow + approach) / aa } else { 0.0 };
+        let limit = self.config.qd_max;
+        for (qd, a) in self.qd_des.iter_mut().zip(&self.a) {
+            *qd = (*qd + a * scale).clamp(-limit, limit);
+        }
     }
 
     /// The best Q-dot that finger `k` could reach without the acceleration limit: what freeing it promises, 1/s.

@@ -88,7 +88,7 @@ impl QualityModel {
     /// Writes the coefficients c of `Q-dot = c . qd_k` for the free finger `k`, eq. (3), with the joint-limit weights
     /// c_k^i and the height term. `qd` is the finger's present desired velocity, for the height's look-ahead.
     pub fn rate_coefficients(&self, k: usize, scene: &Scene<'_>, qd: &[f64], c: &mut [f64]) {
-        let Scene { grasp, state, X_WO, q } = *scene;
+        let Scene { grasp, state, X_WO, q, .. } = *scene;
         let p_WC = grasp.contact(k).p_WC;
         let area_gradient = self.project(scene, Some(k)).gradient(k);
         for (i, c) in c.iter_mut().enumerate() {

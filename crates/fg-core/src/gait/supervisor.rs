@@ -54,6 +54,8 @@ pub enum GaitEnd {
 
 /// Time that a finger must be off the object before it counts as lost, s.
 const LOST_AFTER: f64 = 0.03;
+/// Time without contact after which a sliding finger only looks for the surface, s.
+const GIVE_UP_AFTER: f64 = 0.15;
 /// Time that all fingers must touch before the grasp counts as static, s.
 const STATIC_AFTER: f64 = 0.02;
 /// Time after which refused fingers are asked again, s.
@@ -266,7 +268,7 @@ impl Supervisor {
         if overload > self.config.abort_factor {
             return Some(GaitEnd::Abort);
         }
-        if self.off[self.free] > LOST_AFTER {
+        if self.off[self.free] > GIVE_UP_AFTER {
             return Some(GaitEnd::LostContact);
         }
         if self.elapsed < self.config.min_slide_time {

@@ -148,6 +148,7 @@ pub struct RobustController {
     weight: f64,
     e: Vector6<f64>,
     u: Vector6<f64>,
+    V_WD: Vector6<f64>,
     /// The filtered reference: pose, twist and the twist of the unfiltered reference one step ago.
     filtered: Option<(Isometry3<f64>, Vector6<f64>, Vector6<f64>)>,
 }
@@ -161,7 +162,7 @@ impl RobustController {
         }
         let weight = mass.unwrap_or(K.nominal.mass) * 9.81;
         let zero = Vector6::zeros();
-        Ok(Self { K, config: config.clone(), dt, weight, e: zero, u: zero, filtered: None })
+        Ok(Self { K, config: config.clone(), dt, weight, e: zero, u: zero, V_WD: zero, filtered: None })
     }
 
     /// Returns to rest.
@@ -173,6 +174,11 @@ impl RobustController {
     /// Pose error of the last step against the filtered reference, m and rad.
     pub fn error(&self) -> &Vector6<f64> {
         &self.e
+    }
+
+    /// Desired twist of the object behind the reference filter [m/s; rad/s] in W.
+    pub fn twist(&self) -> &Vector6<f64> {
+        &self.V_WD
     }
 
     /// Desired wrench [N; N m] on the object at Oo in W: alpha(x) + beta(x) u with u = K e.
@@ -204,12 +210,14 @@ impl RobustController {
     /// The reference behind a critically damped second-order filter: steps are softened, and a motion whose twist is
     /// given passes without lag.
     fn filter(&mut self, reference: &Reference, X_WO: &Isometry3<f64>) -> Isometry3<f64> {
+        self.V_WD = reference.V_WD;
         let (Some(w), true) = (self.K.prefilter, self.config.prefilter) else { return reference.X_WD };
         let (X, V, V_D) = self.filtered.unwrap_or((*X_WO, Vector6::zeros(), reference.V_WD));
         let a_D = (reference.V_WD - V_D) / self.dt;
         let a = a_D + pose_error(&reference.X_WD, &X) * (w * w) + (reference.V_WD - V) * (2.0 * w);
         let V = V + a * self.dt;
         let X = integrate(&X, &V, self.dt);
+        self.V_WD = V;
         self.filtered = Some((X, V, reference.V_WD));
         X
     }
