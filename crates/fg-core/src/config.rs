@@ -214,11 +214,13 @@ pub struct RobustConfig {
     pub anti_windup: bool,
     /// Use the artefact's reference prefilter.
     pub prefilter: bool,
+    /// Overcome the joints' damping along the desired motion. Deviation: not in the paper.
+    pub feedforward: bool,
 }
 
 impl Default for RobustConfig {
     fn default() -> Self {
-        Self { anti_windup: true, prefilter: true }
+        Self { anti_windup: true, prefilter: true, feedforward: true }
     }
 }
 

@@ -10,6 +10,7 @@ use crate::gait::supervisor::{Phase, Supervisor};
 use crate::gait::velocity_force::VelocityForceController;
 use crate::grasp::{Grasp, Scene};
 use crate::hand::{HandModel, HandState};
+use crate::manipulation::feedforward::damping_torque;
 use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings};
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
@@ -42,8 +43,8 @@ pub struct DualStagePlanner {
     f_limit: Vec<f64>,
     tau_min: DVector<f64>,
     tau_max: DVector<f64>,
-    /// Torques that hold the fingers' own weight, N m.
-    tau_gravity: DVector<f64>,
+    /// Torques that the fingers need for themselves: their weight, and their damping along the desired motion, N m.
+    tau_own: DVector<f64>,
     tau_free: Vec<f64>,
     command: Command,
     diagnostics: Diagnostics,
@@ -97,7 +98,7 @@ impl DualStagePlanner {
             f_limit: vec![0.0; n],
             tau_min: DVector::zeros(n_q),
             tau_max: DVector::zeros(n_q),
-            tau_gravity: DVector::zeros(n_q),
+            tau_own: DVector::zeros(n_q),
             tau_free: vec![0.0; n_joints],
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
@@ -141,13 +142,13 @@ impl DualStagePlanner {
     /// when fingers come and go.
     pub fn step(&mut self, measurement: &Measurement, reference: &Reference) -> Result<&Command, Error> {
         self.check(measurement, reference)?;
-        let q = measurement.q.as_slice();
-        self.state.update(&self.hand, q);
+        self.state.update(&self.hand, measurement.q.as_slice());
         self.grasp.update(&self.hand, &self.state, measurement);
         self.supervise(measurement);
         self.feel_slip(measurement)?;
         let F_des = self.robust.wrench(reference, &measurement.X_WO);
-        self.bound_torques(q);
+        self.bound_torques(measurement);
+        self.weigh_wrench();
         self.choose_finger(measurement, &F_des);
         self.optimise_forces(&F_des)?;
         self.robust.advance(&self.diagnostics.psi);
@@ -235,17 +236,32 @@ impl DualStagePlanner {
         Vector6::new(1.0, 1.0, 1.0, w, w, w)
     }
 
-    /// Torques left for the contact forces, once the fingers' own weight is held.
-    fn bound_torques(&mut self, q: &[f64]) {
-        let scale = self.wrench_scale();
-        for (mut scaled, column) in self.G.column_iter_mut().zip(self.grasp.G.column_iter()) {
-            scaled.copy_from(&column.component_mul(&scale));
+    /// Torques left for the contact forces, once the fingers' own weight and motion have had theirs.
+    fn bound_torques(&mut self, measurement: &Measurement) {
+        let n_joints = self.hand.n_joints();
+        self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
+        if self.config.robust.feedforward {
+            let scene = scene!(self, measurement);
+            // Eq. (5) has its own velocity term for the finger that slides.
+            let sliding = self.supervisor.sliding_finger();
+            for k in (0..self.hand.n_fingers()).filter(|k| Some(*k) != sliding) {
+                damping_torque(&self.hand, k, &scene, &mut self.tau_free);
+                for (i, tau) in self.tau_free.iter().enumerate() {
+                    self.tau_own[k * n_joints + i] += tau;
+                }
+            }
         }
-        self.state.gravity_torque(&self.hand, self.tau_gravity.as_mut_slice());
-        debug_assert_eq!(q.len(), self.tau_gravity.len());
-        for (i, tau_gravity) in self.tau_gravity.iter().enumerate() {
-            self.tau_min[i] = -self.config.force.tau_max - tau_gravity;
-            self.tau_max[i] = self.config.force.tau_max - tau_gravity;
+        for (i, tau_own) in self.tau_own.iter().enumerate() {
+            self.tau_min[i] = -self.config.force.tau_max - tau_own;
+            self.tau_max[i] = self.config.force.tau_max - tau_own;
+        }
+    }
+
+    /// Grasp map with its torque rows weighted, for the force optimiser.
+    fn weigh_wrench(&mut self) {
+        let scale = self.wrench_scale();
+        for (mut weighted, column) in self.G.column_iter_mut().zip(self.grasp.G.column_iter()) {
+            weighted.copy_from(&column.component_mul(&scale));
         }
     }
 
@@ -302,9 +318,9 @@ impl DualStagePlanner {
         Ok(())
     }
 
-    /// tau = J_h^T f, and the fingers' own weight.
+    /// tau = J_h^T f, and what the fingers need for themselves.
     fn map_torques(&mut self) {
-        self.command.tau += &self.tau_gravity;
+        self.command.tau += &self.tau_own;
     }
 
     /// Eqs. (4) and (5) for the finger that slides or presses.
@@ -322,7 +338,7 @@ impl DualStagePlanner {
         let n_joints = self.hand.n_joints();
         for (i, tau) in self.tau_free.iter().enumerate() {
             let at = k * n_joints + i;
-            self.command.tau[at] = tau + self.tau_gravity[at];
+            self.command.tau[at] = tau + self.tau_own[at];
         }
     }
 

@@ -22,6 +22,9 @@ pub struct Joint {
     pub lower: f64,
     /// Upper joint limit, rad.
     pub upper: f64,
+    /// Viscous damping of the joint, N m s/rad.
+    #[serde(default)]
+    pub damping: f64,
     /// Mass of the link, kg.
     pub mass: f64,
     /// Centre of mass of the link in its frame, m.
@@ -135,6 +138,11 @@ impl HandModel {
         (joint.lower, joint.upper)
     }
 
+    /// Viscous damping of joint `i` of finger `j`, N m s/rad.
+    pub fn damping(&self, j: usize, i: usize) -> f64 {
+        self.fingers[j].joints[i].damping
+    }
+
     /// Radius of the tip of finger `j`, m.
     pub fn tip_radius(&self, j: usize) -> f64 {
         self.fingers[j].tip.radius
@@ -157,6 +165,7 @@ fn link(at: &str, joint: &Joint) -> Result<Link, Error> {
         ("axis", &joint.axis),
         ("com", &joint.com),
         ("mass", &[joint.mass]),
+        ("damping", &[joint.damping]),
         ("limits", &[joint.lower, joint.upper]),
     ] {
         finite(&format!("{at}.{name}"), values)?;
@@ -165,8 +174,10 @@ fn link(at: &str, joint: &Joint) -> Result<Link, Error> {
         let found = format!("[{}, {}]", joint.lower, joint.upper);
         return Err(Error::config(format!("{at}.limits"), "lower < upper", found));
     }
-    if joint.mass < 0.0 {
-        return Err(Error::config(format!("{at}.mass"), "a mass >= 0", joint.mass));
+    for (name, value) in [("mass", joint.mass), ("damping", joint.damping)] {
+        if value < 0.0 {
+            return Err(Error::config(format!("{at}.{name}"), "a number >= 0", value));
+        }
     }
     let [w, x, y, z] = joint.quaternion;
     let quaternion = Quaternion::new(w, x, y, z);

@@ -1,5 +1,6 @@
 //! Section IV: from the pose error to contact forces.
 
+pub mod feedforward;
 pub mod force;
 pub mod lti;
 pub mod robust;
