@@ -142,19 +142,9 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: mujoco.MjModel, f
     geom.solref = hand.geom_solref[finger.tip]
     geom.solimp = hand.geom_solimp[finger.tip]
     geom.rgba = np.array([0.80, 0.47, 0.25, 1.0])
-    mark = body.add_geom(name="object_mark", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.004, 0.0, 0.0])
-    mark.pos, mark.contype, mark.conaffinity = _mark_place(scenario), 0, 0
-    mark.rgba, mark.mass = np.array([0.95, 0.95, 0.95, 1.0]), 0.0
-
-
-def _mark_place(scenario: Scenario) -> NDArray[np.float64]:
-    """A spot on the object's surface near its top, in O, so that a picture shows how far it has turned."""
-    shape = scenario.object.geometry
-    if shape.kind == "ellipsoid":
-        return np.array([0.6 * shape.size[0], 0.0, 0.8 * shape.size[2]])
-    if shape.kind == "cone":
-        return np.array([0.8 * shape.size[1], 0.0, 2.0 * shape.size[2] - shape.bottom])
-    return np.array([0.8 * shape.size[0], 0.0, shape.size[-1]])
+    mark = body.add_geom(name="object_mark", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.0025, 0.0, 0.0])
+    mark.fromto, mark.contype, mark.conaffinity = shape.mark, 0, 0
+    mark.rgba, mark.mass = np.array([0.97, 0.97, 0.97, 1.0]), 0.0
 
 
 def _bits(*names: str) -> int:

@@ -52,7 +52,7 @@ class Sensors:
         parts = np.split(self.row, ends[:-1])
         self._q, self._tau = parts[0].reshape(n, m), parts[1].reshape(n, m)
         self.pose = parts[2]
-        self._place, self._normal_force = parts[3].reshape(n, 3), parts[4]
+        self._place, self.normal_force = parts[3].reshape(n, 3), parts[4]
         self.tangential = np.zeros(n)
         """True friction force at each tip, N: for the log only."""
         self._noise = _Noise(np.random.default_rng(seed), [n * m, 6, 3 * n, n])
@@ -85,7 +85,7 @@ class Sensors:
         self._tau.reshape(-1)[:] = self._force
         self._read_pose(t, pose_noise)
         self._read_touch(place_noise, force_noise)
-        return Measurement(t, self._q, self._tau, self.pose, self._place, self._normal_force)
+        return Measurement(t, self._q, self._tau, self.pose, self._place, self.normal_force)
 
     def _read_pose(self, t: float, noise: Array) -> None:
         c = self._config
@@ -120,7 +120,7 @@ class Sensors:
         if c.contact_force_noise > 0.0:
             normal = np.maximum(normal * (1.0 + c.contact_force_noise * force_noise), 0.0)
         self._place[:] = np.where(touching[:, None], self._radius * in_tip, 0.0)
-        self._normal_force[:] = np.where(touching, normal, 0.0)
+        self.normal_force[:] = np.where(touching, normal, 0.0)
 
 
 class _Noise:

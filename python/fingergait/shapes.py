@@ -49,6 +49,16 @@ class Shape:
             return half * (1.0 + _cone_moment(lower, upper, 1) / _cone_moment(lower, upper, 0))
         return self.size[-1]
 
+    @property
+    def mark(self) -> tuple[float, ...]:
+        """Ends (6,) in O of a line on the top along x, m, by which a picture shows how far the body has turned."""
+        if self.kind == "ellipsoid":
+            x, _, z = self.size
+            return (0.0, 0.0, z, 0.8 * x, 0.0, 0.6 * z)
+        radius = self.size[1] if self.kind == "cone" else self.size[0]
+        top = 2.0 * self.size[2] - self.bottom if self.kind == "cone" else self.size[-1]
+        return (0.0, 0.0, top, 0.9 * radius, 0.0, top)
+
     def inertia(self, mass: float) -> Array:
         """Principal moments (3,) about O of the homogeneous body of this mass, kg m^2."""
         s = np.asarray(self.size)

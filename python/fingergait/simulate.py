@@ -1,0 +1,128 @@
+"""One run: the plant under the compiled control step, from the scenario to its log and metrics."""
+
+import importlib.metadata
+import platform
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from fingergait import _core
+from fingergait.hand import hand_json
+from fingergait.log import Log, columns, describe
+from fingergait.loss import LossMonitor, reason
+from fingergait.metrics import Timing, metrics_of
+from fingergait.model import settings, torque_limits
+from fingergait.paths import find
+from fingergait.plant import MujocoPlant
+from fingergait.reference import Trajectory
+from fingergait.scenario import Scenario
+
+Watcher = Callable[[MujocoPlant, "Log"], bool | None]
+"""Called about every 16 ms of simulated time; True ends the run."""
+
+_CHECK_EVERY = 5  # control steps between two looks at whether the object is lost
+
+
+@dataclass(frozen=True)
+class Run:
+    """The outcome of one run: the figures of `fingergait run --json`, and the log they come from."""
+
+    metrics: dict[str, Any]
+    log: Log
+
+
+def load_controller(scenario: Scenario) -> _core.Controller:
+    """The controller artefact that a scenario names."""
+    path = find(scenario.controller.file, "controllers", ".json", "controller.file")
+    try:
+        return _core.Controller(path.read_text(encoding="utf-8"))
+    except (_core.ArtifactError, UnicodeDecodeError) as error:
+        raise _core.ArtifactError(f"{path.name}: {error}") from None
+
+
+def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
+    """Runs a scenario until its duration is over or the object is lost.
+
+    The same scenario gives the same log, byte for byte, on one machine.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    watch
+        Shown the plant and the log every 16 ms of simulated time; for progress bars and viewers.
+    """
+    plant = MujocoPlant(scenario)
+    hand = _core.HandModel(hand_json(find(scenario.hand.file, "", ".xml", "hand.file")))
+    planner = _core.DualStagePlanner(hand, load_controller(scenario), plant.config)
+    scene = plant.scene
+    n, m = len(scene.fingers), scene.n_joints
+    names = [finger.name for finger in scene.fingers]
+    steps = round((scenario.duration + scenario.grasp.settle) * scenario.controller.rate_hz)
+    log = Log(columns(names, m), names, steps)
+    log.metadata = metadata(plant)
+    step_ns = np.zeros(steps, dtype=np.int64)
+    solver: Counter[str] = Counter()
+    monitor = LossMonitor(scenario)
+    watch_every = max(1, round(0.016 * scenario.controller.rate_hz))
+    lost: str | None = None
+
+    measurement = plant.reset()
+    trajectory = Trajectory(scenario.reference, plant.sensors.pose)
+    begin = time.perf_counter()
+    cuts = np.cumsum([7, 7, n * m, n, len(plant.sensors.row)]).tolist()
+    for k in range(steps):
+        pose, twist = trajectory.sample(plant.t)
+        command, diagnostics = planner.step(measurement, _core.Reference(pose, twist))
+        row = log.append(plant.t)
+        row[: cuts[0]] = plant.object_pose
+        row[cuts[0] : cuts[1]] = pose
+        row[cuts[1] : cuts[2]] = plant.joint_angles
+        row[cuts[2] : cuts[3]] = plant.sensors.tangential
+        row[cuts[3] : cuts[4]] = plant.sensors.row
+        row[cuts[4] :] = diagnostics.row()
+        step_ns[k] = diagnostics.step_ns
+        solver[diagnostics.solver] += 1
+        if k % _CHECK_EVERY == 0 and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force):
+            lost = reason(log, scene, monitor.symptom)
+            break
+        if watch is not None and k % watch_every == 0 and watch(plant, log):
+            break
+        measurement = plant.step(command)
+    plant.close()
+    timing = Timing(step_ns[: len(log)], time.perf_counter() - begin, dict(solver))
+    metrics = metrics_of(log, scenario, lost, timing, float(torque_limits(scene).min()))
+    metrics["simulator"] = settings(scene, scenario)
+    metrics["versions"] = versions()
+    return Run(metrics, log)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    try:
+        own = importlib.metadata.version("fingergait")
+    except importlib.metadata.PackageNotFoundError:  # run from a source tree
+        own = _core.__version__
+    return {
+        "fingergait": own,
+        "core": _core.__version__,
+        "mujoco": mujoco.mj_versionString(),
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }
+
+
+def metadata(plant: MujocoPlant) -> dict[str, str]:
+    """What a log says of its run: scenario, seed, versions and simulator settings."""
+    scenario = plant.scenario
+    return {
+        "scenario": describe(scenario.model_dump(mode="json", exclude_unset=True)),
+        "seed": str(scenario.seed),
+        "versions": describe(versions()),
+        "simulator": describe(settings(plant.scene, scenario)),
+    }
