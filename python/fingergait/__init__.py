@@ -1,1 +1,56 @@
-"""Model-based finger gaits for multi-fingered hands, with a certificate of robustness."""
+"""Model-based finger gaits for multi-fingered hands: robust in-hand rotation of unknown objects, with a certificate."""
+
+from fingergait import gl as gl  # before anything that imports MuJoCo
+from fingergait._core import (
+    ArtifactError,
+    Command,
+    ConfigError,
+    Controller,
+    Diagnostics,
+    DualStagePlanner,
+    FingergaitError,
+    ForceOptimizer,
+    ForceSolution,
+    HandModel,
+    LpSolution,
+    Measurement,
+    Reference,
+    ShapeError,
+    TorquePid,
+    __version__,
+    default_config,
+    gait_lp,
+)
+from fingergait.hand import hand_json
+from fingergait.log import Log
+from fingergait.plant import MujocoPlant, Plant
+from fingergait.scenario import Scenario
+from fingergait.simulate import Run, simulate
+
+__all__ = [
+    "ArtifactError",
+    "Command",
+    "ConfigError",
+    "Controller",
+    "Diagnostics",
+    "DualStagePlanner",
+    "FingergaitError",
+    "ForceOptimizer",
+    "ForceSolution",
+    "HandModel",
+    "Log",
+    "LpSolution",
+    "Measurement",
+    "MujocoPlant",
+    "Plant",
+    "Reference",
+    "Run",
+    "Scenario",
+    "ShapeError",
+    "TorquePid",
+    "__version__",
+    "default_config",
+    "gait_lp",
+    "hand_json",
+    "simulate",
+]

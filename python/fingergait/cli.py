@@ -1,0 +1,97 @@
+"""The command `fingergait`. Each command's work is elsewhere; here are its options, its output and its exit status."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from fingergait._core import FingergaitError
+from fingergait.scenario import Scenario, parse_override
+
+DONE, MISSED, BAD_INPUT = 0, 1, 2
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+
+Overrides = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a scenario key.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+@app.command()
+def run(
+    scenario: Annotated[str, typer.Argument(help="A packaged scenario's name, or a TOML file.")],
+    set_: Overrides = None,
+    duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the sensor noise.")] = None,
+    no_gait: Annotated[bool, typer.Option("--no-gait", help="Never relocate a finger.")] = False,
+    controller: Annotated[str | None, typer.Option(metavar="FILE", help="Controller artefact, or its name.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the results go.")] = None,
+    as_json: Json = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer.")] = False,
+    video: Annotated[Path | None, typer.Option(metavar="FILE.mp4", help="Write a video.")] = None,
+) -> None:
+    """Run a scenario; write its log, plots and film strip."""
+    from fingergait.run import run_scenario
+
+    overrides = dict(map(parse_override, set_ or []))
+    given = {"duration": duration, "seed": seed, "controller.file": controller}
+    overrides |= {key: value for key, value in given.items() if value is not None}
+    if no_gait:
+        overrides["gait.enabled"] = False
+    loaded = Scenario.load(scenario, overrides)
+    metrics = run_scenario(loaded, out, view, video, quiet=as_json)
+    if as_json:
+        print_json(metrics)
+    raise typer.Exit(MISSED if metrics["dropped"] else DONE)
+
+
+@app.command()
+def suite(
+    seeds: Annotated[int, typer.Option(min=1, help="How many seeds.")] = 30,
+    first: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    scenario: Annotated[str, typer.Option(help="The scenario that is varied.")] = "lift-and-rotate",
+    set_: Overrides = None,
+    as_json: Json = False,
+) -> None:
+    """Run the sampled suite: every seed draws object, grasp, errors of the model and noise at once."""
+    from fingergait.report.suite_table import SuiteTable
+    from fingergait.suite import run_suite
+
+    table = SuiteTable(seeds, Console(stderr=True) if as_json else Console())
+    with table:
+        rows = run_suite(list(range(first, first + seeds)), workers, scenario, set_ or [], table.add)
+    summary = table.summary(rows)
+    if as_json:
+        print_json({**summary, "runs": rows})
+    raise typer.Exit(DONE if summary["held"] == len(rows) else MISSED)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],
+) -> None:
+    """Say whether a file is valid, and what is in it."""
+    from fingergait.check import describe_file
+
+    typer.echo(describe_file(file))
+
+
+def print_json(value: object) -> None:
+    """Writes one JSON object to standard output."""
+    print(json.dumps(value, indent=2, allow_nan=False))
+
+
+def main() -> None:
+    """Entry point: errors made on purpose are one line on standard error and exit status 2."""
+    try:
+        app()
+    except FingergaitError as error:
+        print(f"fingergait: {error}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+
+
+if __name__ == "__main__":
+    main()

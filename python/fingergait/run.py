@@ -1,0 +1,128 @@
+"""The work of `fingergait run`: one scenario with progress, and its files."""
+
+import contextlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from fingergait._core import ConfigError
+from fingergait.log import Log
+from fingergait.plant import MujocoPlant
+from fingergait.report.film import film_strip, video_problem
+from fingergait.report.film import video as write_video
+from fingergait.report.plots import write_plots
+from fingergait.report.table import show
+from fingergait.scenario import Scenario
+from fingergait.simulate import simulate
+
+
+def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool) -> dict[str, Any]:
+    """Runs a scenario and writes log.parquet, metrics.json, the plots and film.png; its metrics.
+
+    Parameters
+    ----------
+    scenario
+        What to run.
+    out
+        Folder of the results; absent: runs/<scenario>-<seed>.
+    view
+        Show the run in MuJoCo's viewer, in real time.
+    video
+        File of a video to write.
+    quiet
+        Write nothing to standard output.
+    """
+    folder = out if out is not None else Path("runs") / f"{scenario.name}-{scenario.seed}"
+    if video is not None:
+        _check_video(video)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out: expected a folder that can be written, found {folder} ({error.strerror})") from None
+    notes = Console(stderr=True, highlight=False)
+    with _Watch(scenario, view) as watch:
+        result = simulate(scenario, watch)
+    metrics = result.metrics
+    log = folder / "log.parquet"
+    metrics["log"] = str(log)
+    result.log.write(log)
+    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2) + "\n", encoding="utf-8")
+    write_plots(result.log, scenario, folder)
+    problems = [film_strip(log, folder / "film.png"), write_video(log, video) if video is not None else None]
+    for problem in problems:
+        if problem is not None:
+            notes.print(problem, style="yellow")
+    if not quiet:
+        console = Console()
+        show(metrics, console)
+        console.print(f"log, metrics, plots and film strip: {folder}", highlight=False)
+    return metrics
+
+
+def _check_video(video: Path) -> None:
+    problem = video_problem()
+    if problem is not None:
+        raise ConfigError(problem)
+    if video.suffix != ".mp4" or not video.parent.is_dir():
+        raise ConfigError(f"--video: expected a .mp4 file in a folder that exists, found {video}")
+
+
+class _Watch:
+    """A progress bar on standard error and, if wanted, the viewer; called by `simulate`."""
+
+    def __init__(self, scenario: Scenario, view: bool) -> None:
+        self._scenario, self._view = scenario, view
+        self._viewer: Any = None
+        self._stack = contextlib.ExitStack()
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:5.1f}/{task.total:.0f} s  {task.fields[state]}"),
+            TimeElapsedColumn(),
+        )
+        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task = self._progress.add_task(scenario.name, total=scenario.duration, state="")
+        self._shown = 0.0
+
+    def __enter__(self) -> "_Watch":
+        self._stack.enter_context(self._progress)
+        self._begin = time.perf_counter()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def __call__(self, plant: MujocoPlant, log: Log) -> bool:
+        """Shows the present state; True when the viewer has been closed."""
+        now = time.perf_counter()
+        if now - self._shown > 0.1:
+            self._shown = now
+            state = f"{int(log.last('gaits'))} gaits, Q {log.last('Q'):.5f}"
+            self._progress.update(self._task, completed=max(0.0, plant.t), state=state)
+        if not self._view:
+            return False
+        if self._viewer is None:
+            self._viewer = self._stack.enter_context(_open_viewer(plant))
+        if not self._viewer.is_running():
+            return True
+        self._viewer.sync()
+        ahead = plant.t + self._scenario.grasp.settle - (time.perf_counter() - self._begin)
+        time.sleep(max(0.0, ahead))
+        return False
+
+
+def _open_viewer(plant: MujocoPlant) -> Any:
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise ConfigError("--view: expected a display, found neither DISPLAY nor WAYLAND_DISPLAY set")
+    try:
+        import mujoco.viewer
+
+        return mujoco.viewer.launch_passive(plant.scene.model, plant.data, show_left_ui=False, show_right_ui=False)
+    except (ImportError, RuntimeError) as error:
+        raise ConfigError(f"--view: expected a display that MuJoCo's viewer can open, found none ({error})") from None
