@@ -213,7 +213,7 @@ impl DualStagePlanner {
     fn feel_slip(&mut self, measurement: &Measurement) -> Result<(), Error> {
         let free = self.supervisor.free_finger();
         self.slip.update(&self.grasp, &self.state, &measurement.X_WO, |j| Some(j) != free);
-        let fastest = (0..self.hand.n_fingers()).map(|j| self.slip.speed(j)).fold(0.0, f64::max);
+        let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
             self.pyramid.set_friction(self.friction.mu())?;
             for j in 0..self.hand.n_fingers() {

@@ -11,6 +11,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// Time constant of each of the two filters on the slip velocity, s: pose noise of 0.1 mm stays under the threshold.
 const FILTER: f64 = 0.015;
 
+/// Time constant over which the noise of the slip speed is learnt, s.
+const NOISE_MEMORY: f64 = 1.0;
+/// A slip stands out of the noise by this multiple of its root mean square; chance alone does so once in 1e5 readings.
+const STANDS_OUT: f64 = 3.5;
+
 /// Tangential velocity of each tip's material point against the object's, from joint angles and object pose alone.
 #[derive(Debug, Clone)]
 pub struct SlipDetector {
@@ -19,6 +24,8 @@ pub struct SlipDetector {
     tips: Vec<Isometry3<f64>>,
     first: Vec<Vector3<f64>>,
     second: Vec<Vector3<f64>>,
+    /// Mean square of the slip speeds of fingers that hold, (m/s)^2.
+    noise: f64,
 }
 
 impl SlipDetector {
@@ -26,7 +33,8 @@ impl SlipDetector {
     pub fn new(hand: &HandModel, dt: f64) -> Self {
         let n = hand.n_fingers();
         let zeros = vec![Vector3::zeros(); n];
-        Self { dt, previous: None, tips: vec![Isometry3::identity(); n], first: zeros.clone(), second: zeros }
+        let tips = vec![Isometry3::identity(); n];
+        Self { dt, previous: None, tips, first: zeros.clone(), second: zeros, noise: 0.0 }
     }
 
     /// Forgets the past.
@@ -34,6 +42,7 @@ impl SlipDetector {
         self.previous = None;
         self.first.fill(Vector3::zeros());
         self.second.fill(Vector3::zeros());
+        self.noise = 0.0;
     }
 
     /// Takes this step's kinematics. `holding(j)` says whether finger `j` should stick to the object.
@@ -68,6 +77,19 @@ impl SlipDetector {
             *second += (*first - *second) * share;
         }
         self.previous = Some(*X_WO);
+    }
+
+    /// The fastest slip of this step, m/s; zero where none is above `slip_speed` and stands out of the sensors' noise.
+    pub fn fastest(&mut self, slip_speed: f64) -> f64 {
+        let n = self.second.len();
+        let fastest = (0..n).map(|j| self.speed(j)).fold(0.0, f64::max);
+        let threshold = slip_speed.max(STANDS_OUT * self.noise.sqrt());
+        if fastest > threshold {
+            return fastest;
+        }
+        let mean_square = self.second.iter().map(Vector3::norm_squared).sum::<f64>() / n as f64;
+        self.noise += (mean_square - self.noise) * self.dt / NOISE_MEMORY;
+        0.0
     }
 
     /// Filtered slip speed of finger `j`, m/s.
@@ -112,7 +134,7 @@ impl AdaptiveFriction {
         self.slips
     }
 
-    /// Takes the fastest slip of this step, m/s; true where the coefficient has changed.
+    /// Takes the fastest slip of this step, m/s, zero where nothing slips; true where the coefficient has changed.
     pub fn update(&mut self, fastest: f64) -> bool {
         let before = self.mu;
         let c = &self.config;
@@ -120,7 +142,7 @@ impl AdaptiveFriction {
         if !c.adapt_friction {
             return false;
         }
-        if fastest > c.slip_speed && self.calm > c.slip_hold {
+        if fastest > 0.0 && self.calm > c.slip_hold {
             self.mu = (self.mu * c.slip_factor).max(c.friction_floor.min(c.friction));
             self.calm = 0.0;
             self.slips += 1;
