@@ -34,6 +34,15 @@ impl Residual {
     }
 }
 
+/// N: what rounding makes of the stationarity of an exact solution. A residual below it says nothing against an answer.
+pub fn rounding(qp: &ForceQp, f: &Forces, multipliers: impl Iterator<Item = (usize, f64)>) -> f64 {
+    let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let G = qp.G.iter().map(|g| dot(g, g)).sum::<f64>().sqrt();
+    let pull = qp.alpha3 / qp.s * G * (length(&qp.F_des) + G * length(f));
+    let push: f64 = multipliers.map(|(_, mu)| mu.abs()).sum();
+    8.0 * f64::EPSILON * (pull + push)
+}
+
 /// Largest violation of a row by `f`, N.
 pub fn violation(qp: &ForceQp, f: &Forces) -> f64 {
     let mut worst = 0.0_f64;

@@ -6,8 +6,10 @@
 
 pub mod active_set;
 pub mod clarabel;
+pub mod hessian;
 pub mod hold;
 pub mod kkt;
 pub mod knapsack;
 pub mod polish;
 pub mod qp;
+pub mod working_set;

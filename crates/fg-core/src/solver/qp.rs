@@ -110,6 +110,11 @@ impl ForceQp {
         self.n_contacts
     }
 
+    /// Number of force components that are not pinned.
+    pub fn n_free(&self) -> usize {
+        self.n() - 3 * self.pinned.iter().filter(|p| **p).count()
+    }
+
     /// Number of force components, 3 per contact.
     pub fn n(&self) -> usize {
         3 * self.n_contacts

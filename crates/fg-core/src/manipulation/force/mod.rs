@@ -1,0 +1,284 @@
+//! The force optimiser, eq. (8): contact forces that realise a wrench within friction, torque and force limits.
+
+use crate::error::Error;
+use crate::friction::FrictionPyramid;
+use crate::solver::active_set::{self, ActiveSet};
+use crate::solver::clarabel::{self, InteriorPoint};
+use crate::solver::hold::hold;
+use crate::solver::kkt;
+use crate::solver::polish::polish;
+use crate::solver::qp::{ForceQp, Forces, MAX_CONTACTS, WIDTH};
+use nalgebra::{DVector, Vector6};
+use serde::{Deserialize, Serialize};
+
+mod problem;
+mod solution;
+
+use problem::validate;
+pub use problem::ForceProblem;
+pub use solution::{ForceSolution, ForceStatus, SolverCounters, SolverUsed};
+
+/// Which solver is asked first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SolverChoice {
+    /// The warm-started active set; clarabel where it does not certify its answer.
+    #[default]
+    ActiveSet,
+    /// Clarabel, polished on its active set.
+    Clarabel,
+}
+
+/// Parameters of eq. (8) and of its solution.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ForceSettings {
+    /// alpha1, alpha2 (1/N^2) and alpha3: weights of small forces, of slow changes, of the wrench.
+    pub alpha: [f64; 3],
+    /// Solver asked first.
+    pub solver: SolverChoice,
+    /// N: an answer with a KKT residual up to this is certified. See [`kkt::Residual`].
+    pub tolerance: f64,
+    /// N: an answer of clarabel that no polish improves is still taken up to this KKT residual.
+    pub raw_tolerance: f64,
+    /// Bound on the active set's changes.
+    pub max_changes: usize,
+    /// Bound on clarabel's iterations.
+    pub max_iterations: u32,
+}
+
+impl Default for ForceSettings {
+    /// The paper's weights.
+    fn default() -> Self {
+        Self {
+            alpha: [0.01, 0.01, 1000.0],
+            solver: SolverChoice::ActiveSet,
+            tolerance: 1e-7,
+            raw_tolerance: 1e-5,
+            max_changes: 100,
+            max_iterations: 30,
+        }
+    }
+}
+
+/// Solves eq. (8) again and again. All memory is allocated in [`ForceOptimizer::new`]; the active set allocates nothing.
+pub struct ForceOptimizer {
+    settings: ForceSettings,
+    qp: ForceQp,
+    active_set: ActiveSet,
+    interior_point: InteriorPoint,
+    last: Forces,
+    solution: ForceSolution,
+    counters: SolverCounters,
+}
+
+impl ForceOptimizer {
+    /// An optimiser for one contact per pyramid (1 to 5) and `n_q` joints.
+    pub fn new(pyramids: &[FrictionPyramid], n_q: usize, settings: ForceSettings) -> Result<Self, Error> {
+        if !(1..=MAX_CONTACTS).contains(&pyramids.len()) {
+            return Err(Error::config("pyramids", format!("1 to {MAX_CONTACTS} contacts"), pyramids.len()));
+        }
+        let alpha = settings.alpha;
+        if !alpha.iter().all(|a| a.is_finite() && *a >= 0.0) || alpha[0] + alpha[1] <= 0.0 {
+            return Err(Error::config(
+                "alpha",
+                "three finite numbers >= 0 with alpha[0] + alpha[1] > 0",
+                format!("{alpha:?}"),
+            ));
+        }
+        for (name, value) in [("tolerance", settings.tolerance), ("raw_tolerance", settings.raw_tolerance)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::config(name, "a finite number > 0", value));
+            }
+        }
+        let qp = ForceQp::new(pyramids, n_q, alpha);
+        let n = qp.n();
+        Ok(Self {
+            active_set: ActiveSet::new(settings.max_changes),
+            interior_point: InteriorPoint::new(&qp, settings.max_iterations),
+            qp,
+            settings,
+            last: [0.0; WIDTH],
+            solution: ForceSolution {
+                f: DVector::zeros(n),
+                tau: DVector::zeros(n_q),
+                psi: Vector6::zeros(),
+                status: ForceStatus::Held,
+                solver: SolverUsed::Held,
+                kkt: 0.0,
+                iterations: 0,
+            },
+            counters: SolverCounters::default(),
+        })
+    }
+
+    /// Number of contacts.
+    pub fn n_contacts(&self) -> usize {
+        self.qp.n_contacts()
+    }
+
+    /// Answers taken so far, and reasons.
+    pub fn counts(&self) -> &SolverCounters {
+        &self.counters
+    }
+
+    /// Forgets the last solution: the next solve starts cold, and holds zero forces if it fails.
+    pub fn reset(&mut self) {
+        self.active_set.reset();
+        self.last = [0.0; WIDTH];
+    }
+
+    /// Changes the pyramid of `contact`, to one with the same number of edges. Allocates nothing.
+    pub fn set_pyramid(&mut self, contact: usize, pyramid: &FrictionPyramid) -> Result<(), Error> {
+        let n = self.qp.n_contacts();
+        if contact >= n {
+            return Err(Error::shape("contact", format!("0 to {}", n - 1), contact));
+        }
+        let (expected, found) = (self.qp.n_edges(contact), pyramid.facets().len());
+        if found != expected {
+            return Err(Error::shape("edges", expected, found));
+        }
+        self.qp.set_pyramid(contact, pyramid);
+        Ok(())
+    }
+
+    /// The forces for `problem`. Numerical trouble and bounds that cannot be met are a status, not an error; an error (wrong
+    /// shape, a number that is not finite or absurdly large) changes nothing.
+    pub fn solve(&mut self, problem: &ForceProblem<'_>) -> Result<&ForceSolution, Error> {
+        validate(problem, self.qp.n(), self.solution.tau.len())?;
+        self.qp.set_objective(
+            problem.G.as_slice(),
+            problem.F_des.as_slice(),
+            problem.f_prev.as_slice(),
+            problem.f_normal_max,
+        );
+        self.qp.set_torques(problem.J.as_slice(), problem.tau_min.as_slice(), problem.tau_max.as_slice());
+        if !self.certified() {
+            let (f, violation) = hold(&self.qp, &self.last);
+            self.take(&f, SolverUsed::Held, violation, 0);
+        }
+        problem.J.tr_mul_to(&self.solution.f, &mut self.solution.tau);
+        Ok(&self.solution)
+    }
+
+    /// Asks the solvers in turn; true when one's answer is certified and taken.
+    fn certified(&mut self) -> bool {
+        if !self.qp.consistent {
+            self.counters.bounds_inconsistent += 1;
+            return false;
+        }
+        if self.settings.solver == SolverChoice::ActiveSet {
+            match self.by_active_set() {
+                Verdict::Certified(kkt) => {
+                    let f = *self.active_set.forces();
+                    self.last = f;
+                    self.take(&f, SolverUsed::ActiveSet, kkt, self.active_set.changes());
+                    return true;
+                }
+                Verdict::Infeasible => {
+                    self.counters.active_set_infeasible += 1;
+                    return false;
+                }
+                Verdict::Stopped => self.counters.active_set_stopped += 1,
+                Verdict::Uncertified => self.counters.active_set_uncertified += 1,
+            }
+        }
+        self.by_clarabel()
+    }
+
+    /// Runs the active set from where it stands.
+    fn by_active_set(&mut self) -> Verdict {
+        match self.active_set.solve(&self.qp) {
+            active_set::Outcome::Infeasible => return Verdict::Infeasible,
+            active_set::Outcome::Stopped => return Verdict::Stopped,
+            active_set::Outcome::Optimal => {}
+        }
+        for refinements in 0..=REFINEMENTS {
+            if refinements > 0 {
+                self.active_set.refine(&self.qp);
+            }
+            let f = self.active_set.forces();
+            let kkt = kkt::residual(&self.qp, f, self.active_set.multipliers()).worst();
+            if self.accepted(kkt, f, self.active_set.multipliers()) {
+                return Verdict::Certified(kkt);
+            }
+        }
+        self.active_set.reset();
+        Verdict::Uncertified
+    }
+
+    /// True for a residual within the tolerance, or within what rounding would do to an exact solution.
+    fn accepted(&self, kkt: f64, f: &Forces, multipliers: impl Iterator<Item = (usize, f64)>) -> bool {
+        kkt <= self.settings.tolerance || (kkt.is_finite() && kkt <= kkt::rounding(&self.qp, f, multipliers))
+    }
+
+    fn by_clarabel(&mut self) -> bool {
+        match self.interior_point.solve(&self.qp) {
+            clarabel::Outcome::Infeasible => {
+                self.counters.clarabel_infeasible += 1;
+                return false;
+            }
+            clarabel::Outcome::Failed => {
+                self.counters.clarabel_failed += 1;
+                return false;
+            }
+            clarabel::Outcome::Candidate => {}
+        }
+        let iterations = self.interior_point.iterations();
+        let candidate = self.interior_point.multipliers();
+        if let Some(polished) = polish(&self.qp, candidate, self.settings.tolerance) {
+            let kkt = polished.residual.worst();
+            if self.accepted(kkt, &polished.f, polished.multipliers.iter().copied()) {
+                self.active_set.start_from(polished.multipliers.iter().copied());
+                self.last = polished.f;
+                self.take(&polished.f, SolverUsed::ClarabelPolished, kkt, iterations);
+                return true;
+            }
+        }
+        // Many rows close to active: sort them out one by one, from clarabel's multipliers.
+        let pushing = candidate.iter().filter(|(_, mu, slack)| mu.abs() > *slack);
+        self.active_set.start_from(pushing.map(|(row, mu, _)| (*row, *mu)));
+        if let Verdict::Certified(kkt) = self.by_active_set() {
+            let f = *self.active_set.forces();
+            self.last = f;
+            self.take(&f, SolverUsed::ClarabelPolished, kkt, iterations);
+            return true;
+        }
+        let f = *self.interior_point.forces();
+        let multipliers = self.interior_point.multipliers().iter().map(|(row, mu, _)| (*row, *mu));
+        let kkt = kkt::residual(&self.qp, &f, multipliers).worst();
+        if kkt <= self.settings.raw_tolerance {
+            self.last = f;
+            self.take(&f, SolverUsed::Clarabel, kkt, iterations);
+            return true;
+        }
+        self.counters.clarabel_uncertified += 1;
+        false
+    }
+
+    /// Writes the solution out.
+    fn take(&mut self, f: &Forces, solver: SolverUsed, kkt: f64, iterations: usize) {
+        self.counters.count(solver);
+        for (i, (out, f)) in self.solution.f.iter_mut().zip(f).enumerate() {
+            *out = if self.qp.pinned[i / 3] { 0.0 } else { *f };
+        }
+        self.solution.psi = Vector6::from(self.qp.psi(f));
+        self.solution.status =
+            if solver == SolverUsed::Held { ForceStatus::Held } else { ForceStatus::Solved };
+        self.solution.solver = solver;
+        self.solution.kkt = kkt;
+        self.solution.iterations = iterations;
+    }
+}
+
+/// What came of the active set.
+enum Verdict {
+    /// Optimal, with this KKT residual in N.
+    Certified(f64),
+    Infeasible,
+    Stopped,
+    Uncertified,
+}
+
+/// Newton steps spent on an answer of the active set that is not accurate enough.
+const REFINEMENTS: usize = 2;
