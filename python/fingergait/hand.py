@@ -144,6 +144,7 @@ def _finger_spec(model: mujoco.MjModel, finger: Finger) -> dict[str, object]:
                     "axis": axis.tolist(),
                     "lower": float(lower),
                     "upper": float(upper),
+                    "damping": float(model.dof_damping[model.jnt_dofadr[joint]]),
                     "mass": mass,
                     "com": com.tolist(),
                 }

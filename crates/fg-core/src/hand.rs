@@ -23,7 +23,6 @@ pub struct Joint {
     /// Upper joint limit, rad.
     pub upper: f64,
     /// Viscous damping of the joint, N m s/rad.
-    #[serde(default)]
     pub damping: f64,
     /// Mass of the link, kg.
     pub mass: f64,

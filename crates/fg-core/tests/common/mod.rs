@@ -21,6 +21,7 @@ fn joint(name: &str, position: [f64; 3], quaternion: [f64; 4], axis: [f64; 3], l
         axis,
         lower: limits[0].to_radians(),
         upper: limits[1].to_radians(),
+        damping: 0.05,
         mass: LINK_MASS,
         com: LINK_COM,
     }
