@@ -70,6 +70,8 @@ pub struct GaitConfig {
     /// Joint speed limit of the gait, rad/s, (4b).
     pub qd_max: f64,
     /// Largest change of the desired joint velocity in one step of 2 ms, rad/s, (4d); scaled with the control period.
+    ///
+    /// Deviation: the paper has 0.002. It makes a gait of 0.8 s, and at 0.2 rad/s the planner never rests.
     pub sigma: f64,
     /// Deviation: centre the box (4d) on the previous velocity projected onto the present tangent plane, so that the LP
     /// is always feasible. False: the paper's box.
@@ -121,7 +123,7 @@ impl Default for GaitConfig {
             plane: QualityPlane::Object,
             q_thres: 0.5,
             qd_max: 1.0,
-            sigma: 0.002,
+            sigma: 0.004,
             project_rate_box: true,
             delta: 1e-5,
             K_v: 0.05,
@@ -131,8 +133,8 @@ impl Default for GaitConfig {
             approach_speed: 0.02,
             force_filter: 0.02,
             threshold_margin: 8e-4,
-            unload_time: 0.04,
-            load_time: 0.06,
+            unload_time: 0.08,
+            load_time: 0.1,
             min_slide_time: 0.1,
             max_slide_time: 1.5,
             hysteresis: f64::MAX,
@@ -197,7 +199,7 @@ impl Default for ForceConfig {
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
             adapt_friction: true,
-            slip_speed: 0.008,
+            slip_speed: 0.012,
             slip_factor: 0.9,
             slip_hold: 0.03,
             friction_recovery: 20.0,
