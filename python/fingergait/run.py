@@ -86,7 +86,8 @@ class _Watch:
             TextColumn("{task.completed:5.1f}/{task.total:.0f} s  {task.fields[state]}"),
             TimeElapsedColumn(),
         )
-        self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        console = Console(stderr=True)
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
         self._task = self._progress.add_task(scenario.name, total=scenario.duration, state="")
         self._shown = 0.0
 

@@ -38,7 +38,8 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     Raises
     ------
     ConfigError
-        Where a finger can't reach its contact within its joint limits, or a list has the wrong length.
+        Where a finger can't reach its contact within its joint limits, the object stands in a finger's link, or a list
+        has the wrong length.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     n = len(scene.fingers)
@@ -56,6 +57,8 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
         origin = middle + np.array([0.0, 0.0, scenario.grasp.height + heights[index]])
         target = _touching(scene, data, index, origin, outward)
         _reach(scene, data, index, target)
+    mujoco.mj_kinematics(model, data)
+    _check_clear(scene, data)
     return Start(data.qpos.copy(), _hold(scene, data, middle, scenario.grasp.press))
 
 
@@ -131,6 +134,21 @@ def _reach(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) ->
     place = ", ".join(f"{1e3 * x:.1f}" for x in target)
     found = f"one at ({place}) mm, {1e3 * np.linalg.norm(error):.1f} mm out of reach"
     raise ConfigError(f"object.size: expected an object whose side finger {finger.name} can touch, found {found}")
+
+
+def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
+    """Refuses an object that stands in a finger's link."""
+    model = scene.model
+    geom = model.geom(OBJECT).id
+    for finger in scene.fingers:
+        links = {int(model.jnt_bodyid[joint]) for joint in finger.joints}
+        for other in range(model.ngeom):
+            if other in scene.tips or int(model.body_weldid[model.geom_bodyid[other]]) not in links:
+                continue
+            depth = -_distance(model, data, geom, other)
+            if model.geom_contype[other] and depth > 1e-4:
+                found = f"{1e3 * depth:.1f} mm of finger {finger.name} inside it"
+                raise ConfigError(f"object.size: expected an object that leaves the fingers room, found {found}")
 
 
 def _hold(scene: SceneModel, data: mujoco.MjData, middle: Array, press: float) -> Array:

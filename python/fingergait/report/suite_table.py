@@ -23,12 +23,14 @@ class SuiteTable:
 
     def __init__(self, total: int, console: Console) -> None:
         self._console = console
+        bar = Console(stderr=True)
         self._progress = Progress(
             *Progress.get_default_columns()[:2],
             MofNCompleteColumn(),
             TimeElapsedColumn(),
-            console=Console(stderr=True),
+            console=bar,
             transient=True,
+            disable=not bar.is_terminal,
         )
         self._task = self._progress.add_task("seeds", total=total)
 
