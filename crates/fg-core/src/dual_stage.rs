@@ -41,6 +41,8 @@ pub struct DualStagePlanner {
     /// Grasp map with its torque rows weighted, for the force optimiser.
     G: DMatrix<f64>,
     f_limit: Vec<f64>,
+    /// Psi behind a low pass: a single noisy sample breaks off no gait.
+    psi_filtered: Vector6<f64>,
     tau_min: DVector<f64>,
     tau_max: DVector<f64>,
     /// Torques that the fingers need for themselves: their weight, and their damping along the desired motion, N m.
@@ -49,6 +51,9 @@ pub struct DualStagePlanner {
     command: Command,
     diagnostics: Diagnostics,
 }
+
+/// Time constant of the filter on Psi before it is compared with what a gait allows, s.
+const PSI_FILTER: f64 = 0.03;
 
 /// The present scene; a macro, so that only the fields it reads are borrowed.
 macro_rules! scene {
@@ -96,6 +101,7 @@ impl DualStagePlanner {
             f_prev: DVector::zeros(3 * n),
             G: DMatrix::zeros(6, 3 * n),
             f_limit: vec![0.0; n],
+            psi_filtered: Vector6::zeros(),
             tau_min: DVector::zeros(n_q),
             tau_max: DVector::zeros(n_q),
             tau_own: DVector::zeros(n_q),
@@ -133,6 +139,7 @@ impl DualStagePlanner {
         self.planner.reset();
         self.velocity_force.reset(0.0);
         self.f_prev.fill(0.0);
+        self.psi_filtered.fill(0.0);
         self.command.tau.fill(0.0);
     }
 
@@ -201,7 +208,7 @@ impl DualStagePlanner {
             *h = self.quality.height_error(&scene, j);
         }
         let before = self.supervisor.phase();
-        let overload = self.overload(&self.diagnostics.psi);
+        let overload = self.overload(&self.psi_filtered);
         self.supervisor.advance(&self.grasp, quality.Q, self.diagnostics.rate.Q_dot, overload);
         if let (true, Some(k)) = (self.supervisor.phase() != before, self.supervisor.sliding_finger()) {
             self.planner.reset();
@@ -311,6 +318,7 @@ impl DualStagePlanner {
         self.command.tau.copy_from(&solution.tau);
         let d = &mut self.diagnostics;
         d.psi = solution.psi.component_div(&scale);
+        self.psi_filtered += (d.psi - self.psi_filtered) * (self.dt / PSI_FILTER).min(1.0);
         d.status = solution.status;
         d.solver = solution.solver;
         d.kkt = solution.kkt;
