@@ -96,6 +96,12 @@ class Diagnostics:
     @property
     def solver(self) -> str: ...
     @property
+    def safe_mode(self) -> str:
+        """How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop"."""
+    @property
+    def faults(self) -> list[str]:
+        """What was wrong with this step, by name; empty when all was well."""
+    @property
     def step_ns(self) -> int:
         """Thread CPU time of this control step inside the compiled core, ns."""
     @staticmethod

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::manipulation::force::SolverChoice;
+use crate::safety::config::SafetyConfig;
 use serde::{Deserialize, Serialize};
 
 /// All parameters of [`crate::dual_stage::DualStagePlanner`] and [`crate::torque::TorquePid`].
@@ -20,6 +21,8 @@ pub struct Config {
     pub robust: RobustConfig,
     /// Section II: the joint torque controller.
     pub torque: TorqueConfig,
+    /// When a measurement is not believed, and what then happens. Deviation: the paper's sensors work.
+    pub safety: SafetyConfig,
 }
 
 impl Default for Config {
@@ -31,6 +34,7 @@ impl Default for Config {
             force: ForceConfig::default(),
             robust: RobustConfig::default(),
             torque: TorqueConfig::default(),
+            safety: SafetyConfig::default(),
         }
     }
 }
@@ -171,6 +175,8 @@ pub struct ForceConfig {
     pub tau_rate_max: f64,
     /// Which solver answers first.
     pub solver: SolverChoice,
+    /// KKT residual up to which an answer is certified, N.
+    pub tolerance: f64,
     /// Lower the assumed friction while fingers slip. Deviation: the paper relocates the slipping finger only.
     pub adapt_friction: bool,
     /// Slip speed of a holding finger above which the assumed friction is lowered, m/s.
@@ -198,6 +204,7 @@ impl Default for ForceConfig {
             f_n_max: 15.0,
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
+            tolerance: 1e-7,
             adapt_friction: true,
             slip_speed: 0.012,
             slip_factor: 0.9,
@@ -293,6 +300,7 @@ impl Config {
             ("force.tau_max", f.tau_max, positive, 1e3),
             ("force.f_n_max", f.f_n_max, positive, 1e6),
             ("force.tau_rate_max", f.tau_rate_max, positive, 1e9),
+            ("force.tolerance", f.tolerance, positive, 1.0),
             ("force.slip_speed", f.slip_speed, positive, 1e3),
             ("force.slip_factor", f.slip_factor, 0.01, 1.0),
             ("force.slip_hold", f.slip_hold, 0.0, 1e3),
@@ -311,7 +319,7 @@ impl Config {
         if !(3..=12).contains(&f.edges) {
             return Err(Error::config("force.edges", "3 to 12 edges", f.edges));
         }
-        Ok(())
+        self.safety.validate()
     }
 }
 

@@ -5,6 +5,7 @@ use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
 use crate::hand::HandModel;
 use crate::manipulation::force::{ForceStatus, SolverUsed};
+use crate::safety::{Faults, SafeMode};
 use nalgebra::{DVector, Vector6};
 
 /// The figures of one control step. Allocated once, overwritten by each step; holds no time measurement.
@@ -54,6 +55,10 @@ pub struct Diagnostics {
     pub iterations: usize,
     /// Friction coefficient that the force optimiser assumes.
     pub friction: f64,
+    /// What was wrong with this step's measurement, or with the step itself.
+    pub faults: Faults,
+    /// How the hand was driven because of it.
+    pub safe_mode: SafeMode,
 }
 
 impl Diagnostics {
@@ -83,6 +88,8 @@ impl Diagnostics {
             kkt: 0.0,
             iterations: 0,
             friction: 0.0,
+            faults: Faults::default(),
+            safe_mode: SafeMode::Normal,
         }
     }
 
@@ -113,6 +120,8 @@ impl Diagnostics {
         show("kkt", &[self.kkt]);
         show("iterations", &[self.iterations as f64]);
         show("friction", &[self.friction]);
+        show("faults", &[f64::from(self.faults.bits())]);
+        show("safe_mode", &[f64::from(self.safe_mode as u8)]);
     }
 
     /// Names of the numbers that [`Diagnostics::row`] writes, in order; elements of vectors end in their index.

@@ -1,5 +1,8 @@
 //! The dual-stage planner: one control step from sensors to torques. The only file that knows the order.
 
+mod fallback;
+mod report;
+
 use crate::config::Config;
 use crate::diagnostics::Diagnostics;
 use crate::error::Error;
@@ -11,11 +14,14 @@ use crate::gait::velocity_force::VelocityForceController;
 use crate::grasp::{Grasp, Scene};
 use crate::hand::{HandModel, HandState};
 use crate::manipulation::feedforward::damping_torque;
-use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings};
+use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, ForceStatus, SolverUsed};
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
+use crate::safety::guard::{Course, Guard, Plan, SteadyWrench};
+use crate::safety::limiter::TorqueLimiter;
+use crate::safety::SafeMode;
 use crate::signals::{Command, Measurement, Reference};
-use crate::spatial::{angular, is_finite, linear};
+use crate::spatial::{angular, linear};
 use nalgebra::{DMatrix, DVector, Vector6};
 
 /// The whole controller. All memory is allocated in [`DualStagePlanner::new`].
@@ -23,6 +29,7 @@ pub struct DualStagePlanner {
     hand: HandModel,
     config: Config,
     dt: f64,
+    guard: Guard,
     state: HandState,
     grasp: Grasp,
     quality: QualityModel,
@@ -48,6 +55,10 @@ pub struct DualStagePlanner {
     /// Torques that the fingers need for themselves: their weight, and their damping along the desired motion, N m.
     tau_own: DVector<f64>,
     tau_free: Vec<f64>,
+    steady: SteadyWrench,
+    limiter: TorqueLimiter,
+    /// Share of the torques that is left after one step in which nothing is held.
+    fade: f64,
     command: Command,
     diagnostics: Diagnostics,
 }
@@ -79,6 +90,8 @@ impl DualStagePlanner {
         let settings = ForceSettings {
             alpha: [config.force.alpha1, config.force.alpha2, config.force.alpha3],
             solver: config.force.solver,
+            tolerance: config.force.tolerance,
+            raw_tolerance: 100.0 * config.force.tolerance,
             ..ForceSettings::default()
         };
         let pyramids = vec![pyramid.clone(); n];
@@ -86,6 +99,7 @@ impl DualStagePlanner {
         diagnostics.friction = config.force.friction;
         Ok(Self {
             dt,
+            guard: Guard::new(&hand, &config.safety, config.gait.contact_force, dt),
             state: HandState::new(&hand),
             grasp: Grasp::new(&hand, config.gait.contact_force),
             quality: QualityModel::new(&hand, &config.gait),
@@ -106,6 +120,9 @@ impl DualStagePlanner {
             tau_max: DVector::zeros(n_q),
             tau_own: DVector::zeros(n_q),
             tau_free: vec![0.0; n_joints],
+            steady: SteadyWrench::new(dt),
+            limiter: TorqueLimiter::new(n_q, &config.force, dt),
+            fade: (-dt / config.safety.stop_time).exp(),
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
             hand,
@@ -128,68 +145,60 @@ impl DualStagePlanner {
         &self.diagnostics
     }
 
-    /// Returns to the state after construction.
-    pub fn reset(&mut self) {
-        self.grasp = Grasp::new(&self.hand, self.config.gait.contact_force);
-        self.quality.reset();
-        self.supervisor.reset();
-        self.robust.reset();
-        self.slip.reset();
-        self.friction.reset();
-        self.planner.reset();
-        self.velocity_force.reset(0.0);
-        self.f_prev.fill(0.0);
-        self.psi_filtered.fill(0.0);
-        self.command.tau.fill(0.0);
-    }
-
     /// The torques to track until the next step, every 1 / `rate_hz` seconds.
     ///
     /// The robust controller and the force optimiser run at every step in every mode, so that K's state is continuous
-    /// when fingers come and go.
+    /// when fingers come and go. An error is a caller's mistake, an array of the wrong length, and changes nothing;
+    /// whatever else is wrong with the measurement, the command is finite and inside its limits, and
+    /// [`Diagnostics::faults`] says what was wrong.
     pub fn step(&mut self, measurement: &Measurement, reference: &Reference) -> Result<&Command, Error> {
-        self.check(measurement, reference)?;
-        self.state.update(&self.hand, measurement.q.as_slice());
-        self.grasp.update(&self.hand, &self.state, measurement);
-        self.supervise(measurement);
-        self.feel_slip(measurement)?;
-        let F_des = self.robust.wrench(reference, &measurement.X_WO);
-        self.bound_torques(measurement);
-        self.weigh_wrench();
-        self.choose_finger(measurement, &F_des);
-        self.optimise_forces(&F_des)?;
-        self.robust.advance(&self.diagnostics.psi);
-        self.map_torques();
-        self.drive_free_finger(measurement);
-        self.limit_torques();
-        self.diagnose(&F_des);
+        self.guard.check(measurement)?;
+        let phase = self.supervisor.phase();
+        let plan = Plan {
+            f: self.f_prev.as_slice(),
+            free: self.supervisor.free_finger(),
+            qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
+            pressing: phase == Phase::Press,
+            grasped: self.supervisor.threshold().is_some(),
+        };
+        match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
+            Course::Run => {
+                let (measurement, reference) = self.guard.take();
+                self.run(&measurement, &reference);
+                self.guard.put_back(measurement);
+            }
+            Course::Stop => self.stop(),
+            Course::Repeat => {}
+        }
+        self.diagnostics.faults = self.guard.faults();
+        self.diagnostics.safe_mode = self.guard.mode();
         Ok(&self.command)
     }
 
-    fn check(&self, measurement: &Measurement, reference: &Reference) -> Result<(), Error> {
-        let n_q = self.command.tau.len();
-        let lengths = [
-            ("measurement.q", n_q, measurement.q.len()),
-            ("measurement.tau", n_q, measurement.tau.len()),
-            ("measurement.tactile", self.hand.n_fingers(), measurement.tactile.len()),
-        ];
-        for (field, expected, found) in lengths {
-            if expected != found {
-                return Err(Error::shape(field, expected, found));
-            }
+    /// The step on a measurement that can be used.
+    fn run(&mut self, measurement: &Measurement, reference: &Reference) {
+        self.grasp.update(&self.hand, &self.state, measurement);
+        if self.guard.mode() != SafeMode::Normal {
+            self.supervisor.abort();
         }
-        let tactile = |c: &crate::signals::Tactile| c.f_n.is_finite() && c.p_FC.iter().all(|x| x.is_finite());
-        let finite = [
-            ("measurement.q", measurement.q.iter().all(|x| x.is_finite())),
-            ("measurement.pose", is_finite(&measurement.X_WO)),
-            ("measurement.tactile", measurement.tactile.iter().all(tactile)),
-            ("reference.pose", is_finite(&reference.X_WD)),
-            ("reference.twist", reference.V_WD.iter().all(|x| x.is_finite())),
-        ];
-        match finite.iter().find(|(_, finite)| !finite) {
-            Some((field, _)) => Err(Error::config(*field, "finite numbers", "NaN or infinity")),
-            None => Ok(()),
+        self.supervise(measurement);
+        self.feel_slip(measurement);
+        let F_des = self.wrench(measurement, reference);
+        self.bound_torques(measurement);
+        self.weigh_wrench();
+        if self.guard.mode() == SafeMode::Normal {
+            self.choose_finger(measurement, &F_des);
         }
+        self.optimise_forces(&F_des);
+        if !self.guard.blind() {
+            self.robust.advance(&self.diagnostics.psi);
+        }
+        self.command.tau += &self.tau_own;
+        self.drive_free_finger(measurement);
+        self.damp_fingers();
+        let at_limit = self.limiter.apply(&mut self.command.tau);
+        self.diagnose(&F_des);
+        self.report(at_limit);
     }
 
     /// Quality, first grasp, and the gait's phases.
@@ -217,18 +226,29 @@ impl DualStagePlanner {
     }
 
     /// Adapts the assumed friction to the slip of the fingers that hold the object.
-    fn feel_slip(&mut self, measurement: &Measurement) -> Result<(), Error> {
+    fn feel_slip(&mut self, measurement: &Measurement) {
         let free = self.supervisor.free_finger();
-        self.slip.update(&self.grasp, &self.state, &measurement.X_WO, |j| Some(j) != free);
+        if self.guard.discontinuous() {
+            self.slip.skip();
+        }
+        let guard = &self.guard;
+        let holds = |j| Some(j) != free && guard.trusts(j);
+        self.slip.update(&self.grasp, &self.state, &measurement.X_WO, holds);
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
-            self.pyramid.set_friction(self.friction.mu())?;
-            for j in 0..self.hand.n_fingers() {
-                self.forces.set_pyramid(j, &self.pyramid)?;
-                self.probe.set_pyramid(j, &self.pyramid)?;
-            }
+            self.assume_friction();
         }
-        Ok(())
+    }
+
+    /// Tells the force optimisers the friction coefficient to assume.
+    fn assume_friction(&mut self) {
+        // The coefficient is positive and the number of edges stays, so nothing here can fail.
+        let mut outcome = self.pyramid.set_friction(self.friction.mu());
+        for j in 0..self.hand.n_fingers() {
+            outcome = outcome.and(self.forces.set_pyramid(j, &self.pyramid));
+            outcome = outcome.and(self.probe.set_pyramid(j, &self.pyramid));
+        }
+        debug_assert!(outcome.is_ok());
     }
 
     /// What the fingers fail to deliver, as a multiple of what a gait allows.
@@ -300,9 +320,11 @@ impl DualStagePlanner {
     }
 
     /// Eq. (8), with the free finger's force ramped or taken out.
-    fn optimise_forces(&mut self, F_des: &Vector6<f64>) -> Result<(), Error> {
+    fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
-            *limit = self.supervisor.force_limit(j, self.config.force.f_n_max);
+            let damped = self.guard.damps(j);
+            *limit = if damped { 0.0 } else { self.supervisor.force_limit(j, self.config.force.f_n_max) };
+            self.f_prev[3 * j + 2] += self.guard.squeeze();
         }
         let scale = self.wrench_scale();
         let solution = self.forces.solve(&ForceProblem {
@@ -313,22 +335,24 @@ impl DualStagePlanner {
             tau_min: &self.tau_min,
             tau_max: &self.tau_max,
             f_normal_max: &self.f_limit,
-        })?;
-        self.f_prev.copy_from(&solution.f);
-        self.command.tau.copy_from(&solution.tau);
+        });
         let d = &mut self.diagnostics;
-        d.psi = solution.psi.component_div(&scale);
-        self.psi_filtered += (d.psi - self.psi_filtered) * (self.dt / PSI_FILTER).min(1.0);
-        d.status = solution.status;
-        d.solver = solution.solver;
-        d.kkt = solution.kkt;
-        d.iterations = solution.iterations;
-        Ok(())
-    }
-
-    /// tau = J_h^T f, and what the fingers need for themselves.
-    fn map_torques(&mut self) {
-        self.command.tau += &self.tau_own;
+        if let Ok(solution) = solution {
+            self.f_prev.copy_from(&solution.f);
+            self.command.tau.copy_from(&solution.tau);
+            d.psi = solution.psi.component_div(&scale);
+            self.psi_filtered += (d.psi - self.psi_filtered) * (self.dt / PSI_FILTER).min(1.0);
+            d.status = solution.status;
+            d.solver = solution.solver;
+            d.kkt = solution.kkt;
+            d.iterations = solution.iterations;
+        } else {
+            // Refused for numbers that the guard should have kept out: the last torques.
+            self.command.tau.copy_from(self.limiter.previous());
+            self.command.tau -= &self.tau_own;
+            d.status = ForceStatus::Held;
+            d.solver = SolverUsed::Held;
+        }
     }
 
     /// Eqs. (4) and (5) for the finger that slides or presses.
@@ -348,37 +372,5 @@ impl DualStagePlanner {
             let at = k * n_joints + i;
             self.command.tau[at] = tau + self.tau_own[at];
         }
-    }
-
-    /// Every command is finite, inside the torque limits and the torque rate limit.
-    fn limit_torques(&mut self) {
-        let limit = self.config.force.tau_max;
-        let change = self.config.force.tau_rate_max * self.dt;
-        for (tau, previous) in self.command.tau.iter_mut().zip(self.diagnostics.tau.iter()) {
-            let wanted = if tau.is_finite() { *tau } else { *previous };
-            *tau = wanted.clamp(previous - change, previous + change).clamp(-limit, limit);
-        }
-    }
-
-    fn diagnose(&mut self, F_des: &Vector6<f64>) {
-        let d = &mut self.diagnostics;
-        d.phase = self.supervisor.phase();
-        d.free_finger = self.supervisor.free_finger();
-        d.gaits = self.supervisor.gaits();
-        d.last_end = self.supervisor.last_end();
-        d.threshold = self.supervisor.threshold().unwrap_or(f64::NAN);
-        d.e = *self.robust.error();
-        d.F_des = *F_des;
-        d.f.copy_from(&self.f_prev);
-        for (f_n, contact) in d.f_n.iter_mut().zip(self.grasp.contacts()) {
-            *f_n = contact.f_n;
-        }
-        for j in 0..self.hand.n_fingers() {
-            d.slip[j] = self.slip.speed(j);
-        }
-        d.friction = self.friction.mu();
-        d.slips = self.friction.slips();
-        d.qd_des.copy_from_slice(self.planner.qd_des());
-        d.tau.copy_from(&self.command.tau);
     }
 }

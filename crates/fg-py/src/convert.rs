@@ -62,6 +62,19 @@ pub fn pose(field: &str, array: &PyArrayLike1<'_, f64, AllowTypeChange>) -> PyRe
     Ok(Isometry3::from_parts(Translation3::new(v[0], v[1], v[2]), rotation))
 }
 
+/// The pose in an array (7,) as a sensor gave it: what is not a unit quaternion passes through, for the core to judge.
+pub fn sensed_pose(field: &str, array: &PyArrayLike1<'_, f64, AllowTypeChange>) -> PyResult<Isometry3<f64>> {
+    let v = vector(field, array, 7)?;
+    let quaternion = Quaternion::new(v[3], v[4], v[5], v[6]);
+    let unit = (quaternion.norm() - 1.0).abs() <= 1e-3;
+    let rotation = if unit {
+        UnitQuaternion::new_normalize(quaternion)
+    } else {
+        UnitQuaternion::new_unchecked(quaternion)
+    };
+    Ok(Isometry3::from_parts(Translation3::new(v[0], v[1], v[2]), rotation))
+}
+
 /// A new one-dimensional array.
 pub fn array1<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> {
     PyArray1::from_slice(py, values)

@@ -1,7 +1,7 @@
 //! `DualStagePlanner` with its signals.
 
 use crate::controller::Controller;
-use crate::convert::{array1, array2, flat, pose, vector};
+use crate::convert::{array1, array2, flat, pose, sensed_pose, vector};
 use crate::cpu_clock::ThreadClock;
 use crate::errors::to_py;
 use crate::hand::HandModel;
@@ -37,7 +37,7 @@ impl Measurement {
             t,
             q: DVector::from_vec(flat("q", &q, shape)?),
             tau: DVector::from_vec(flat("tau", &tau, shape)?),
-            X_WO: self::pose("pose", &pose)?,
+            X_WO: sensed_pose("pose", &pose)?,
             tactile: tactile.map(|(p, f_n)| Tactile { p_FC: Vector3::new(p[0], p[1], p[2]), f_n }).collect(),
         }))
     }
@@ -121,6 +121,18 @@ impl Diagnostics {
     #[getter]
     fn solver(&self) -> &'static str {
         self.core.solver.as_str()
+    }
+
+    /// How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop".
+    #[getter]
+    fn safe_mode(&self) -> &'static str {
+        self.core.safe_mode.as_str()
+    }
+
+    /// What was wrong with this step, by name; empty when all was well.
+    #[getter]
+    fn faults(&self) -> Vec<&'static str> {
+        self.core.faults.iter().map(fg_core::safety::Fault::as_str).collect()
     }
 
     /// Grasp quality Q, eq. (1).

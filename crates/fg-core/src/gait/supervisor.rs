@@ -211,6 +211,18 @@ impl Supervisor {
         self.since_refusal = 0.0;
     }
 
+    /// Ends a gait early: a finger that slides presses, one that is being unloaded is loaded again.
+    pub fn abort(&mut self) {
+        match self.phase {
+            Phase::Unload => self.enter(Phase::Load),
+            Phase::Slide => {
+                self.end = GaitEnd::Abort;
+                self.enter(Phase::Press);
+            }
+            _ => {}
+        }
+    }
+
     /// Moves through the phases. `Q` and `Q_dot` are this step's quality and the last step's LP value; `overload` is the
     /// slack of the remaining fingers over its limit.
     pub fn advance(&mut self, grasp: &Grasp, Q: f64, Q_dot: f64, overload: f64) {

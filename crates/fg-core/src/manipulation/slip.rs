@@ -45,6 +45,11 @@ impl SlipDetector {
         self.noise = 0.0;
     }
 
+    /// Takes no velocity over the coming step: its duration is not one period.
+    pub fn skip(&mut self) {
+        self.previous = None;
+    }
+
     /// Takes this step's kinematics. `holding(j)` says whether finger `j` should stick to the object.
     pub fn update(
         &mut self,

@@ -1,0 +1,83 @@
+//! What the control step does where it cannot do as the paper says.
+
+use super::DualStagePlanner;
+use crate::diagnostics::Diagnostics;
+use crate::grasp::Grasp;
+use crate::signals::{Measurement, Reference};
+use nalgebra::Vector6;
+
+impl DualStagePlanner {
+    /// Returns to the state after construction.
+    pub fn reset(&mut self) {
+        self.guard.reset();
+        self.grasp = Grasp::new(&self.hand, self.config.gait.contact_force);
+        self.quality.reset();
+        self.supervisor.reset();
+        self.release();
+        self.slip.reset();
+        self.friction.reset();
+        self.assume_friction();
+        self.planner.reset();
+        self.velocity_force.reset(0.0);
+        self.limiter.reset();
+        self.command.tau.fill(0.0);
+        self.diagnostics = Diagnostics::new(self.hand.n_fingers(), self.hand.n_joints());
+        self.diagnostics.friction = self.friction.mu();
+    }
+
+    /// Nothing is held: torques fade to the fingers' own weight, and what was known of the grasp is forgotten.
+    pub(super) fn stop(&mut self) {
+        self.supervisor.abort();
+        self.release();
+        self.tau_own.fill(0.0);
+        if self.guard.knows_joints() {
+            self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
+        }
+        for at in 0..self.tau_own.len() {
+            self.fade(at);
+        }
+        self.limiter.apply(&mut self.command.tau);
+        let F_des = Vector6::zeros();
+        self.diagnostics.psi = F_des;
+        self.diagnose(&F_des);
+    }
+
+    /// Forgets the forces on the object, and what K has learnt about it.
+    fn release(&mut self) {
+        self.robust.reset();
+        self.steady.reset();
+        self.forces.reset();
+        self.probe.reset();
+        self.f_prev.fill(0.0);
+        self.psi_filtered.fill(0.0);
+    }
+
+    /// The wrench that K asks for; without a pose, or any number that can be used, the last one, smoothed.
+    pub(super) fn wrench(&mut self, measurement: &Measurement, reference: &Reference) -> Vector6<f64> {
+        if !self.guard.blind() {
+            let F_des = self.robust.wrench(reference, &measurement.X_WO);
+            if F_des.iter().all(|F| F.abs() < 1e6) {
+                self.steady.take(&F_des);
+                return F_des;
+            }
+            self.robust.reset();
+        }
+        *self.steady.wrench()
+    }
+
+    /// Lets go of fingers of which neither angles nor contact are known.
+    pub(super) fn damp_fingers(&mut self) {
+        let n_joints = self.hand.n_joints();
+        for at in 0..self.command.tau.len() {
+            if self.guard.damps(at / n_joints) {
+                self.fade(at);
+            }
+        }
+    }
+
+    /// Moves torque `at` towards the finger's own weight and motion.
+    fn fade(&mut self, at: usize) {
+        let own = self.tau_own[at];
+        self.command.tau[at] = own + (self.limiter.previous()[at] - own) * self.fade;
+    }
+}

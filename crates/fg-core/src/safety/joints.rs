@@ -1,0 +1,196 @@
+//! The joint angles: which to believe, and which fingers' kinematics can be trusted.
+
+use super::config::SafetyConfig;
+use super::debounce::Debounce;
+use super::odometry::Odometry;
+use super::{Fault, Faults};
+use crate::hand::HandModel;
+
+/// Good samples before jumps are judged: the first one may be the bad one.
+const SETTLE: u32 = 10;
+/// Longest time for which a joint may have moved unseen, s.
+const UNSEEN: f64 = 1.0;
+/// A finger off the object whose angle has jumped and then stays consistent for this long has been moved, s.
+const RELEARN: f64 = 0.5;
+
+/// What the guard remembers of one joint.
+#[derive(Debug, Clone, Copy)]
+struct Joint {
+    lower: f64,
+    upper: f64,
+    /// The last sample, whatever it was, and the last good one, rad.
+    raw: f64,
+    good: f64,
+    /// For how long the sample has been the same number, s.
+    still: f64,
+    /// For how long there has been no sample to judge, s.
+    missing: f64,
+    /// For how long samples have been consistent with each other but not with the last good one, s.
+    odd: f64,
+    /// How far the joint was asked to turn since the sample last changed, rad.
+    asked: f64,
+    /// The encoder is stuck, until it reads another number.
+    stuck: bool,
+    known: bool,
+}
+
+/// Judges all joint angles. Allocated once.
+#[derive(Debug, Clone)]
+pub struct JointGuard {
+    config: SafetyConfig,
+    n_joints: usize,
+    joints: Vec<Joint>,
+    /// For each finger, whether its kinematics have failed for long enough.
+    failed: Vec<Debounce>,
+    samples: u32,
+    dt: f64,
+}
+
+/// What the last step knew about one finger.
+#[derive(Debug, Clone, Copy)]
+pub struct Use<'a> {
+    /// True where the finger feels the object.
+    pub touching: bool,
+    /// True where it should stick to the object.
+    pub holding: bool,
+    /// Desired joint velocities, for the finger that slides, rad/s.
+    pub qd_des: Option<&'a [f64]>,
+}
+
+impl JointGuard {
+    /// A guard for `hand` at the control period `dt`.
+    pub fn new(hand: &HandModel, config: &SafetyConfig, dt: f64) -> Self {
+        let n_joints = hand.n_joints();
+        let limits = (0..hand.n_fingers()).flat_map(|j| (0..n_joints).map(move |i| hand.limits(j, i)));
+        let margin = config.joint_margin;
+        let joint = |(lower, upper): (f64, f64)| Joint::new(lower - margin, upper + margin);
+        Self {
+            config: config.clone(),
+            n_joints,
+            joints: limits.map(joint).collect(),
+            failed: vec![Debounce::default(); hand.n_fingers()],
+            samples: 0,
+            dt,
+        }
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        for joint in &mut self.joints {
+            *joint = Joint::new(joint.lower, joint.upper);
+        }
+        self.failed.iter_mut().for_each(Debounce::reset);
+        self.samples = 0;
+    }
+
+    /// True once every joint has had a good sample.
+    pub fn known(&self) -> bool {
+        self.joints.iter().all(|joint| joint.known)
+    }
+
+    /// False where the kinematics of finger `j` have failed.
+    pub fn trusts(&self, j: usize) -> bool {
+        !self.failed[j].confirmed()
+    }
+
+    /// True where `q` is the last sample again, bit for bit.
+    pub fn same(&self, q: &[f64]) -> bool {
+        self.joints.iter().zip(q).all(|(joint, q)| joint.raw.to_bits() == q.to_bits())
+    }
+
+    /// Writes into `trusted` the angles to use for the sample `q`; `elapsed` seconds have passed since the last one.
+    pub fn admit<'a>(
+        &mut self,
+        q: &[f64],
+        elapsed: f64,
+        odometry: &Odometry,
+        using: impl Fn(usize) -> Use<'a>,
+        trusted: &mut [f64],
+        faults: &mut Faults,
+    ) {
+        let settled = self.samples >= SETTLE;
+        self.samples = self.samples.saturating_add(1);
+        for j in 0..self.failed.len() {
+            let at = j * self.n_joints..(j + 1) * self.n_joints;
+            let using = using(j);
+            let mut bad = false;
+            for (i, joint) in self.joints[at.clone()].iter_mut().enumerate() {
+                let speed = using.qd_des.map_or(0.0, |qd| qd[i]);
+                joint.asked += speed * elapsed;
+                bad |= !joint.take(q[at.start + i], elapsed, settled, using.touching, &self.config);
+            }
+            let stuck = self.stuck(j, &using, odometry);
+            faults.insert_if(bad, Fault::Encoder);
+            faults.insert_if(stuck, Fault::EncoderStuck);
+            // Getting stuck has taken its time already.
+            let confirm = if stuck { 0.0 } else { self.config.ride_through };
+            self.failed[j].update(bad || stuck, self.dt, confirm, self.config.recovery_time);
+            for (trusted, joint) in trusted[at.clone()].iter_mut().zip(&self.joints[at]) {
+                *trusted = joint.good;
+            }
+        }
+    }
+
+    /// Whether a joint of finger `j` reads the same number although the finger moves.
+    fn stuck(&mut self, j: usize, using: &Use<'_>, odometry: &Odometry) -> bool {
+        let c = &self.config;
+        let drift = odometry.drift(j);
+        let drifts = using.holding && drift > c.stuck_distance && drift > 3.0 * odometry.drift_of_others(j);
+        let mut stuck = false;
+        for joint in &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints] {
+            joint.stuck |= joint.still > c.stuck_time && (drifts || joint.asked.abs() > c.stuck_angle);
+            if joint.stuck {
+                // The true angle may be anywhere that it can have reached meanwhile.
+                joint.missing = joint.still.min(UNSEEN);
+                stuck = true;
+            }
+        }
+        stuck
+    }
+}
+
+impl Joint {
+    fn new(lower: f64, upper: f64) -> Self {
+        Self {
+            lower,
+            upper,
+            raw: f64::NAN,
+            good: 0.5 * (lower + upper),
+            still: 0.0,
+            missing: 0.0,
+            odd: 0.0,
+            asked: 0.0,
+            stuck: false,
+            known: false,
+        }
+    }
+
+    /// Takes the sample `x`; true where it is good.
+    fn take(&mut self, x: f64, elapsed: f64, settled: bool, touching: bool, c: &SafetyConfig) -> bool {
+        let consistent = (x - self.raw).abs() <= c.joint_jump;
+        if x.to_bits() == self.raw.to_bits() {
+            self.still += elapsed;
+        } else {
+            self.still = 0.0;
+            self.asked = 0.0;
+            self.stuck = false;
+        }
+        self.raw = x;
+        // NaN fails every comparison.
+        if !(x >= self.lower && x <= self.upper) {
+            self.missing = (self.missing + elapsed).min(UNSEEN);
+            return false;
+        }
+        let window = c.joint_jump + c.joint_speed * (elapsed + self.missing);
+        let inside = (x - self.good).abs() <= window;
+        self.odd = if inside || !consistent || touching { 0.0 } else { self.odd + elapsed };
+        let good = inside || !settled || !self.known || self.odd > RELEARN;
+        if good {
+            self.good = x;
+            self.missing = 0.0;
+            self.odd = 0.0;
+            self.known = true;
+        }
+        good
+    }
+}
