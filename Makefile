@@ -1,0 +1,66 @@
+# make setup   .venv with pinned dependencies and the release module
+# make demo    the main job: lift a cylinder and turn it without end
+# make test    every test
+# make check   formats, lints and types; warnings fail
+# make bench   how long a control step takes
+# Each starts from a bare checkout.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+BIN := .venv/bin
+missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
+SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
+
+.PHONY: setup demo test wheel check bench clean
+
+setup: .venv/.module
+
+demo: setup
+	$(BIN)/fingergait run lift-and-rotate
+
+test: setup wheel
+	cargo test --workspace --locked --quiet
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q
+
+# The installed wheel, away from the checkout, finds its models.
+wheel: setup
+	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT; \
+	$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir "$$folder" .; \
+	$(BIN)/pip install --quiet --no-deps --target "$$folder/site" "$$folder"/fingergait-*.whl; \
+	python="$$PWD/$(BIN)/python"; cd "$$folder"; \
+	PYTHONPATH="$$folder/site" "$$python" -c 'import sys, fingergait; assert fingergait.__file__.startswith(sys.argv[1])' "$$folder"; \
+	PYTHONPATH="$$folder/site" "$$python" -m fingergait.cli run hold --duration 0.5 --json --out out > /dev/null; \
+	echo "wheel: 1 passed, 0 failed"
+
+check: setup
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: setup
+	cargo bench --workspace --locked
+
+clean:
+	rm -rf .venv target
+
+# The pinned dependencies are there already, or, on Python 3.10, come with the module by the ranges of pyproject.toml.
+.venv/.module: .venv/.dependencies $(SOURCES)
+	@command -v cargo > /dev/null || $(call missing,a stable Rust toolchain,https://rustup.rs or: apt-get install cargo)
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video]'
+	@touch $@
+
+.venv/.dependencies: requirements.lock pyproject.toml
+	@command -v $(PYTHON) > /dev/null || $(call missing,Python 3.10 or later,apt-get install python3 python3-venv)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || $(call missing,Python 3.10 or later,make PYTHON=python3.11)
+	@$(PYTHON) -c 'import ensurepip, venv' 2> /dev/null || $(call missing,the venv module of Python,apt-get install python3-venv)
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
+	@if $(BIN)/python -c 'import sys; sys.exit(sys.version_info < (3, 11))'; \
+	then $(BIN)/pip install --quiet --requirement requirements.lock; \
+	else $(BIN)/pip install --quiet --group dev; fi
+	@touch $@
