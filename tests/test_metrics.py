@@ -153,7 +153,7 @@ TOUCHING = np.ones(4)
 @pytest.mark.parametrize(
     ("pose", "forces", "symptom"),
     [
-        ([0.0, 0.021, 0.06, 1.0, 0.0, 0.0, 0.0], TOUCHING, "position error passed 20 mm"),
+        ([0.0, 0.011, 0.06, 1.0, 0.0, 0.0, 0.0], TOUCHING, "position error passed 10 mm"),
         ([0.0, 0.0, 0.06, np.cos(0.18), np.sin(0.18), 0.0, 0.0], TOUCHING, "orientation error passed 0.35 rad"),
         (UPRIGHT, [0.0, 0.0, 2.0, 0.0], "fewer than two fingertips"),
     ],

@@ -12,7 +12,7 @@ from fingergait.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-POSITION_LIMIT = 0.020  # m
+POSITION_LIMIT = 0.010  # m: less than the lift, so that an object that stays on the palm is lost too
 ORIENTATION_LIMIT = 0.35  # rad
 SUSTAINED = 0.1  # s
 _STEP_TIME = 2.0  # s that a step of the reference may take before its own size counts as an error
