@@ -25,13 +25,15 @@ class LossMonitor:
     Parameters
     ----------
     scenario
-        Its reference step, which for two seconds is no error.
+        Its reference step, which for two seconds is no error. With faults, which may stop the reference inside the
+        controller, only a tilt of the object's axis counts as an error of orientation.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         step = scenario.reference.step
         self._step_at = scenario.reference.step_at
         self._allowance = math.hypot(*step[:3]), math.hypot(*step[3:])
+        self._tilt_only = bool(scenario.fault)
         self._since: float | None = None
         self.symptom = ""
 
@@ -51,12 +53,25 @@ class LossMonitor:
         orientation_limit = ORIENTATION_LIMIT + (self._allowance[1] if stepping else 0.0)
         if math.dist(p[:3], d[:3]) > position_limit:
             return f"the position error passed {1e3 * POSITION_LIMIT:.0f} mm"
-        cosine = abs(p[3] * d[3] + p[4] * d[4] + p[5] * d[5] + p[6] * d[6])
-        if 2.0 * math.acos(min(1.0, cosine)) > orientation_limit:
+        if self._tilt_only:
+            angle = _tilt(p, d)
+        else:
+            cosine = abs(p[3] * d[3] + p[4] * d[4] + p[5] * d[5] + p[6] * d[6])
+            angle = 2.0 * math.acos(min(1.0, cosine))
+        if angle > orientation_limit:
             return f"the orientation error passed {ORIENTATION_LIMIT} rad"
         if t > 0.0 and np.count_nonzero(normal_forces) < 2:
             return "fewer than two fingertips touched the object"
         return None
+
+
+def _tilt(p: list[float], d: list[float]) -> float:
+    """Angle between the z axes of two poses, rad."""
+    axes = []
+    for _, _, _, w, x, y, z in (p, d):
+        axes.append((2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)))
+    cosine = sum(a * b for a, b in zip(*axes, strict=True))
+    return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 def reason(log: Log, scene: SceneModel, symptom: str) -> str:

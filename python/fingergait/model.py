@@ -100,6 +100,18 @@ def torque_limits(scene: SceneModel) -> NDArray[np.float64]:
     return limits.reshape(len(scene.fingers), scene.n_joints)
 
 
+def true_inertia(scenario: Scenario) -> NDArray[np.float64]:
+    """Principal moments (3,) of the true object, kg m^2; refuses moments that no body can have."""
+    inertia: NDArray[np.float64] = scenario.object.geometry.inertia(scenario.object.mass)
+    inertia = inertia * np.asarray(scenario.truth.inertia_scale)
+    if 2.0 * inertia.max() > inertia.sum():
+        found = ", ".join(f"{x:.3g}" for x in inertia)
+        raise ConfigError(
+            f"truth.inertia_scale: expected moments of which none exceeds the other two together, found {found} kg m^2"
+        )
+    return inertia
+
+
 def settings(scene: SceneModel, scenario: Scenario) -> dict[str, Any]:
     """The simulator's version and contact settings, printed with every result."""
     model = scene.model
@@ -126,13 +138,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: mujoco.MjModel, f
     body.add_freejoint(name=OBJECT)
     body.mass = scenario.object.mass * truth.mass_scale
     body.ipos = np.array(truth.com_offset)
-    inertia = shape.inertia(scenario.object.mass) * np.asarray(truth.inertia_scale)
-    if 2.0 * inertia.max() > inertia.sum():
-        found = ", ".join(f"{x:.3g}" for x in inertia)
-        raise ConfigError(
-            f"truth.inertia_scale: expected moments of which none exceeds the other two together, found {found} kg m^2"
-        )
-    body.inertia = inertia
+    body.inertia = true_inertia(scenario)
     body.explicitinertial = True
     geom = shape.add_to(spec, body, OBJECT)
     geom.contype, geom.conaffinity = _OBJECT, _FINGERS | _PALM | _OBJECT

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingergait._core import Command, Measurement, TorquePid
 from fingergait.config import core_config
+from fingergait.injection import Injection
 from fingergait.model import SceneModel, build_scene, torque_limits
 from fingergait.scenario import Scenario
 from fingergait.sensors import Sensors
@@ -49,6 +50,7 @@ class MujocoPlant:
         self.scenario = scenario
         self.scene: SceneModel = build_scene(scenario)
         self.start = nominal_start(self.scene, scenario)
+        self.injection = Injection(self.scene, scenario.fault)
         self.data = mujoco.MjData(self.scene.model)
         n, m = len(self.scene.fingers), self.scene.n_joints
         self.config = core_config(scenario, float(torque_limits(self.scene).min()))
@@ -69,25 +71,33 @@ class MujocoPlant:
             mujoco.mj_step(scene.model, data)
         self._tau_row[:] = data.actuator_force[scene.act]
         self._pid.reset()
+        self.injection.reset()
         self._steps = 0
         self._lead = round(self.scenario.grasp.settle * self.scenario.controller.rate_hz)
         self.t = -self._lead * self.scenario.period
-        self.sensors = Sensors(scene, data, self.scenario.sensors, self.scenario.seed)
+        self.sensors = Sensors(scene, data, self.scenario.sensors, self.scenario.seed, self.injection)
         return self.sensors.read(self.t)
 
     def step(self, command: Command) -> Measurement:
-        """Drives the motors with `command` for one control period."""
-        model, data, act = self.scene.model, self.data, self.scene.act
+        """Drives the motors with `command` for one control period, or for more where a fault makes ticks drop."""
+        for _ in range(self.injection.periods(self.t)):
+            self._drive(command.tau)
+            self._steps += 1
+            self.t = (self._steps - self._lead) * self.scenario.period
+        return self.sensors.read(self.t)
+
+    def _drive(self, tau: Array) -> None:
+        """Drives the motors to the joint torques `tau` for one control period."""
+        model, data, act, faults = self.scene.model, self.data, self.scene.act, self.injection
         if self.scenario.disturbance:
             self._disturb()
-        desired = command.tau
+        faults.contacts(self.t)
+        desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
-            data.ctrl[act] = self._pid.step(desired, self._tau).ravel()
+            motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()
+            data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
             self._tau_row[:] = data.actuator_force[act]
-        self._steps += 1
-        self.t = (self._steps - self._lead) * self.scenario.period
-        return self.sensors.read(self.t)
 
     def close(self) -> None:
         """Switches the motors off."""

@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fingergait._core import ConfigError
+from fingergait.faults import KINDS, Fault
+from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 from fingergait.paths import find
 from fingergait.shapes import SIZES, Shape
 
@@ -19,17 +21,6 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
-Vector = tuple[float, float, float]
-Twist = tuple[float, float, float, float, float, float]
-
-
-class Table(BaseModel):
-    """Base of the scenario's tables: unknown keys, NaN and infinity are refused."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
 
 
 class HandConfig(Table):
@@ -141,7 +132,8 @@ class SensorConfig(Table):
 
     position_noise (m, each axis), orientation_noise (rad, each axis), pose_rate_hz (Hz; absent: every control step),
     pose_delay_s (s): the object's pose. encoder_noise (rad), encoder_bits (bits a turn; absent: no quantisation): joint
-    angles. contact_place_noise (m, each axis), contact_force_noise (fraction of the force): tactile sensors.
+    angles. contact_place_noise (m, each axis), contact_force_noise (fraction of the force): tactile sensors, which are
+    also off by contact_place_bias (m, in each fingertip's frame) and contact_force_bias (N) while they touch.
     """
 
     position_noise: NonNegative = 0.0
@@ -149,6 +141,8 @@ class SensorConfig(Table):
     encoder_noise: NonNegative = 0.0
     contact_place_noise: NonNegative = 0.0
     contact_force_noise: NonNegative = 0.0
+    contact_place_bias: Vector = (0.0, 0.0, 0.0)
+    contact_force_bias: float = 0.0
     pose_rate_hz: Positive | None = None
     pose_delay_s: NonNegative = 0.0
     encoder_bits: Annotated[int, Field(ge=4, le=32)] | None = None
@@ -186,6 +180,7 @@ class Scenario(Table):
     sensors: SensorConfig = SensorConfig()
     physics: PhysicsConfig = PhysicsConfig()
     disturbance: tuple[Disturbance, ...] = ()
+    fault: tuple[Fault, ...] = ()
     gait: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
@@ -281,7 +276,10 @@ def _resolve_beside(values: dict[str, Any], table: str, folder: Path) -> None:
 def _describe(error: ValidationError) -> str:
     first, *rest = error.errors(include_url=False)
     field = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("function-", "tuple[", "float")))
-    if first["type"] == "extra_forbidden":
+    if first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        found = first["input"].get("kind") if isinstance(first["input"], dict) else first["input"]
+        text = f"{field}.kind: expected one of {', '.join(KINDS)}, found {found!r}"
+    elif first["type"] == "extra_forbidden":
         text = f"{field}: expected {_keys(first['loc'])}, found an unknown key"
     elif first["type"] == "missing":
         text = f"{field}: expected a value, found none"
@@ -293,11 +291,12 @@ def _describe(error: ValidationError) -> str:
 
 def _keys(loc: tuple[int | str, ...]) -> str:
     """The keys that the table around `loc` has."""
+    if loc[0] in ("disturbance", "fault"):
+        return "one of " + ", ".join((KINDS[str(loc[2])] if loc[0] == "fault" else Disturbance).model_fields)
     table: type[BaseModel] = Scenario
     for part in loc[:-1]:
-        if isinstance(part, str):
-            kind = table.model_fields[part].annotation
-            table = Disturbance if part == "disturbance" else kind if isinstance(kind, type) else table
+        kind = table.model_fields[str(part)].annotation
+        table = kind if isinstance(kind, type) else table
     return "one of " + ", ".join(table.model_fields)
 
 

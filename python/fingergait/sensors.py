@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import Measurement
+from fingergait.injection import Injection
 from fingergait.model import TOUCH_SIZE, SceneModel
 from fingergait.scenario import SensorConfig
 
@@ -33,11 +34,15 @@ class Sensors:
         Noise, rates and delays.
     seed
         Of the noise.
+    injection
+        The faults that spoil what is read.
     """
 
-    def __init__(self, scene: SceneModel, data: mujoco.MjData, config: SensorConfig, seed: int) -> None:
+    def __init__(
+        self, scene: SceneModel, data: mujoco.MjData, config: SensorConfig, seed: int, injection: Injection
+    ) -> None:
         n, m = len(scene.fingers), scene.n_joints
-        self._scene, self._config = scene, config
+        self._scene, self._config, self._injection = scene, config, injection
         self._q_true = _view(data.qpos, scene.q)
         self._pose_true = data.qpos[scene.object_q : scene.object_q + 7]
         self._force = _view(data.actuator_force, scene.act)
@@ -52,13 +57,15 @@ class Sensors:
         parts = np.split(self.row, ends[:-1])
         self._q, self._tau = parts[0].reshape(n, m), parts[1].reshape(n, m)
         self.pose = parts[2]
-        self._place, self.normal_force = parts[3].reshape(n, 3), parts[4]
-        self.tangential = np.zeros(n)
-        """True friction force at each tip, N: for the log only."""
+        self._place, self._normal_force = parts[3].reshape(n, 3), parts[4]
+        self.normal_force, self.tangential = np.zeros(n), np.zeros(n)
+        """True normal and friction force at each tip, N: for the log and the verdict only."""
         self._noise = _Noise(np.random.default_rng(seed), [n * m, 6, 3 * n, n])
         self._step = 0.0 if config.encoder_bits is None else 2.0 * math.pi / 2**config.encoder_bits
         self._late: deque[tuple[float, Array]] = deque()
         self._next_pose = -math.inf
+        self._seen = np.zeros(7)  # the newest pose that has come in, before faults
+        self._bias = config.contact_force_bias, np.array(config.contact_place_bias)
 
     @staticmethod
     def columns(fingers: list[str], n_joints: int) -> list[str]:
@@ -85,7 +92,8 @@ class Sensors:
         self._tau.reshape(-1)[:] = self._force
         self._read_pose(t, pose_noise)
         self._read_touch(place_noise, force_noise)
-        return Measurement(t, self._q, self._tau, self.pose, self._place, self.normal_force)
+        said = self._injection.read(t, self._q, self._tau, self.pose, self._place, self._normal_force)
+        return Measurement(said, self._q, self._tau, self.pose, self._place, self._normal_force)
 
     def _read_pose(self, t: float, noise: Array) -> None:
         c = self._config
@@ -103,7 +111,8 @@ class Sensors:
                 _turn(pose[3:], c.orientation_noise * noise[3:])
             self._late.append((t if first else t + c.pose_delay_s, pose))
         while self._late and self._late[0][0] <= now:
-            self.pose[:] = self._late.popleft()[1]
+            self._seen[:] = self._late.popleft()[1]
+        self.pose[:] = self._seen
 
     def _read_touch(self, place_noise: Array, force_noise: Array) -> None:
         c, scene = self._config, self._scene
@@ -114,13 +123,16 @@ class Sensors:
         normal = np.abs((force * outward).sum(axis=1))  # along the tip's own normal
         self.tangential[:] = np.sqrt(np.maximum((force * force).sum(axis=1) - normal * normal, 0.0))
         in_tip = (self._xmat[scene.links] * outward[:, :, None]).sum(axis=1)  # R_WF^T n
-        if c.contact_place_noise > 0.0:
-            in_tip = in_tip + c.contact_place_noise * place_noise.reshape(-1, 3) / self._radius
-            in_tip /= np.sqrt((in_tip * in_tip).sum(axis=1, keepdims=True))
-        if c.contact_force_noise > 0.0:
-            normal = np.maximum(normal * (1.0 + c.contact_force_noise * force_noise), 0.0)
-        self._place[:] = np.where(touching[:, None], self._radius * in_tip, 0.0)
         self.normal_force[:] = np.where(touching, normal, 0.0)
+        force_bias, place_bias = self._bias
+        if c.contact_place_noise > 0.0 or place_bias.any():
+            error = c.contact_place_noise * place_noise.reshape(-1, 3) + place_bias
+            in_tip = in_tip + error / self._radius
+            in_tip /= np.sqrt((in_tip * in_tip).sum(axis=1, keepdims=True))
+        if c.contact_force_noise > 0.0 or force_bias != 0.0:
+            normal = np.maximum(normal * (1.0 + c.contact_force_noise * force_noise) + force_bias, 0.0)
+        self._place[:] = np.where(touching[:, None], self._radius * in_tip, 0.0)
+        self._normal_force[:] = np.where(touching, normal, 0.0)
 
 
 class _Noise:

@@ -1,0 +1,176 @@
+"""Injects a scenario's faults between the simulator and the controller: in what sensors say and what motors do."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from fingergait import faults as kinds
+from fingergait._core import ConfigError
+from fingergait.model import OBJECT, SceneModel
+
+Array = NDArray[np.float64]
+
+
+class Injection:
+    """The faults of one run, with what they remember. Without faults it costs nothing.
+
+    Parameters
+    ----------
+    scene
+        The compiled model; its friction is changed while a fault says so.
+    faults
+        The scenario's.
+
+    Raises
+    ------
+    ConfigError
+        Where a fault names a finger or a joint that the hand doesn't have.
+    """
+
+    def __init__(self, scene: SceneModel, faults: tuple[kinds.FaultWindow, ...]) -> None:
+        self._n, self._m = len(scene.fingers), scene.n_joints
+        self._scene = scene
+        self._faults = faults
+        for number, fault in enumerate(faults):
+            _check(fault, number, self._n, self._m)
+        self._friction = scene.model.geom(OBJECT).friction.copy()
+        self._limits = np.abs(scene.model.actuator_forcerange[scene.act]).min(axis=1)  # (n m,), N m
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets what the faults froze or counted, and gives the contacts their friction back."""
+        self._frozen: dict[int, Any] = {}
+        self._steps: dict[int, int] = {}
+        self._scene.model.geom(OBJECT).friction[:] = self._friction
+
+    def read(self, t: float, q: Array, tau: Array, pose: Array, place: Array, force: Array) -> float:
+        """Spoils one measurement in place and gives its time, s.
+
+        Parameters
+        ----------
+        t
+            True time, s.
+        q, tau
+            Joint angles, rad, and torques, N m, (n_fingers, n_joints).
+        pose
+            Object pose (7,) in W, wxyz.
+        place, force
+            Tactile place (n_fingers, 3), m, and force (n_fingers,), N.
+        """
+        said = t
+        for number, fault in enumerate(self._faults):
+            if not fault.active(t):
+                self._frozen.pop(number, None)
+                continue
+            match fault:
+                case kinds.SensorNan(sensor=sensor, finger=finger, joint=joint):
+                    arrays = {"encoder": (q,), "torque": (tau,), "pose": (pose,), "tactile": (place, force)}[sensor]
+                    for array in arrays:
+                        array[_which(finger, joint)] = np.nan
+                case kinds.PoseJump(shift=shift):
+                    pose[:3] += shift[:3]
+                    _turn(pose[3:], np.array(shift[3:]))
+                case kinds.PoseStale():
+                    pose[:] = self._freeze(number, pose)
+                case kinds.EncoderStuck(finger=finger, joint=joint):
+                    q[finger, joint] = self._freeze(number, q[finger, joint])
+                case kinds.EncoderRange(finger=finger, joint=joint, value=value):
+                    q[finger, joint] = value
+                case kinds.TactileLost(finger=finger):
+                    place[_which(finger, None)], force[_which(finger, None)] = 0.0, 0.0
+                case kinds.TactileStuck(finger=finger, value=value):
+                    place[finger], force[finger] = self._freeze(number, place[finger]), value
+                case kinds.ClockStall():
+                    said = float(self._freeze(number, np.float64(t)))
+                case kinds.ClockJump(shift=shift):
+                    said += shift
+                case kinds.JointOrderSwapped(finger=finger, joint=joint, other=other):
+                    for array in (q, tau):
+                        array[finger, [joint, other]] = array[finger, [other, joint]]
+        return said
+
+    def command(self, t: float, tau: Array) -> Array:
+        """Torques, N m, (n_fingers, n_joints), that reach the motors' own controllers at time t."""
+        for fault in self._faults:
+            if isinstance(fault, kinds.JointOrderSwapped) and fault.active(t):
+                tau = tau.copy()
+                tau[fault.finger, [fault.joint, fault.other]] = tau[fault.finger, [fault.other, fault.joint]]
+        return tau
+
+    def torque_reading(self, t: float, tau: Array) -> Array:
+        """Joint torques, N m, (n_fingers, n_joints), as the torque controllers measure them."""
+        for fault in self._faults:
+            if isinstance(fault, kinds.SensorNan) and fault.sensor == "torque" and fault.active(t):
+                tau = tau.copy()
+                tau[_which(fault.finger, fault.joint)] = np.nan
+        return tau
+
+    def motors(self, t: float, torque: Array) -> Array:
+        """Torques (n_fingers * n_joints,), N m, that the motors give of those asked for."""
+        for fault in self._faults:
+            if not fault.active(t):
+                continue
+            if isinstance(fault, kinds.FingerPowerLoss):
+                torque = torque.copy()
+                torque.reshape(self._n, self._m)[_which(fault.finger, fault.joint)] = 0.0
+            elif isinstance(fault, kinds.MotorWeak):
+                limit = np.full((self._n, self._m), 1.0)
+                limit[_which(fault.finger, None)] = fault.scale
+                torque = np.clip(torque, -limit.ravel() * self._limits, limit.ravel() * self._limits)
+        return torque
+
+    def contacts(self, t: float) -> None:
+        """Gives the object the friction that it has at time t."""
+        drops = [fault for fault in self._faults if isinstance(fault, kinds.FrictionDrop)]
+        if drops:
+            scale = np.prod([fault.scale for fault in drops if fault.active(t)])
+            self._scene.model.geom(OBJECT).friction[:] = scale * self._friction
+
+    def periods(self, t: float) -> int:
+        """Control periods for which the motors go on with the command given at time t: 1, and those missed."""
+        count = 1
+        for number, fault in enumerate(self._faults):
+            if isinstance(fault, kinds.DroppedTicks) and fault.active(t):
+                step = self._steps.get(number, 0)
+                self._steps[number] = step + 1
+                if step % fault.every == 0:
+                    count += fault.ticks
+        return count
+
+    def _freeze(self, number: int, value: Any) -> Any:
+        """What fault `number` read when it began."""
+        return self._frozen.setdefault(number, value.copy())
+
+
+def _which(finger: int | None, joint: int | None) -> tuple[slice | int, ...] | slice:
+    """Index of one joint, one finger, or everything."""
+    if finger is None:
+        return slice(None)
+    return (finger,) if joint is None else (finger, joint)
+
+
+def _check(fault: kinds.FaultWindow, number: int, n_fingers: int, n_joints: int) -> None:
+    for field, count in (("finger", n_fingers), ("joint", n_joints), ("other", n_joints)):
+        value = getattr(fault, field, None)
+        if value is not None and value >= count:
+            raise ConfigError(f"fault.{number}.{field}: expected 0 to {count - 1}, found {value}")
+    if isinstance(fault, kinds.SensorNan):
+        applies = {"encoder": 2, "torque": 2, "tactile": 1, "pose": 0}[fault.sensor]
+        for index, field in enumerate(("finger", "joint")):
+            if getattr(fault, field) is not None and index >= applies:
+                raise ConfigError(f"fault.{number}.{field}: expected none for the sensor {fault.sensor}, found one")
+        if fault.joint is not None and fault.finger is None:
+            raise ConfigError(f"fault.{number}.finger: expected the finger of joint {fault.joint}, found none")
+    if isinstance(fault, kinds.JointOrderSwapped) and fault.joint == fault.other:
+        raise ConfigError(f"fault.{number}.other: expected another joint than {fault.joint}, found the same")
+
+
+def _turn(quaternion: Array, vector: Array) -> None:
+    """Turns the wxyz `quaternion` in place by the rotation vector (3,) in W."""
+    angle = float(np.linalg.norm(vector))
+    if angle > 0.0:
+        turn = np.empty(4)
+        mujoco.mju_axisAngle2Quat(turn, vector / angle, angle)
+        mujoco.mju_mulQuat(quaternion, turn, quaternion.copy())
