@@ -70,6 +70,29 @@ def suite(
 
 
 @app.command()
+def campaign(
+    spec: Annotated[str, typer.Argument(metavar="SPEC.toml", help="A packaged campaign's name, or a TOML file.")],
+    samples: Annotated[int | None, typer.Option(min=1, help="Number of runs, instead of the campaign's own.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Local processes; all cores by default.")] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler to use instead.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted campaign.")] = False,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the data set and the report go.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a campaign of sampled scenarios; write its data set and report."""
+    from fingergait.campaign.command import Options, run_campaign
+    from fingergait.campaign.spec import CampaignSpec
+    from fingergait.report.campaign_table import show
+
+    figures = run_campaign(CampaignSpec.load(spec, samples), Options(workers, scheduler, resume, out))
+    if as_json:
+        print_json(figures)
+    else:
+        show(figures, Console())
+    raise typer.Exit(DONE if all(claim["held"] for claim in figures["claims"]) else MISSED)
+
+
+@app.command()
 def check(
     file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],
 ) -> None:

@@ -1,0 +1,116 @@
+"""Runs trials on dask: a local cluster of one-thread processes, or any scheduler that is already there."""
+
+import contextlib
+import logging
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import dask
+from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed.client import Future
+
+from fingergait._core import ConfigError, FingergaitError
+from fingergait.campaign.trial import METRICS, OBSERVED, Outcome, Trial, run_trial
+
+_CONNECT_S = 10.0
+_ATTEMPTS = 3  # times that a run is handed in again after the scheduler lost it
+_AHEAD = 4  # runs handed in for each worker: enough to keep it busy, few enough to lose little
+
+
+def default_workers() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
+    """A client of the scheduler at that address, or of a new local cluster of `workers` processes."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_CONNECT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            found = " ".join(str(error).split()) or type(error).__name__
+            raise ConfigError(f"--scheduler: expected a dask scheduler at {scheduler}, found none ({found})") from None
+        with client:
+            yield client
+        return
+    settings = {
+        "distributed.worker.daemon": True,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.admin.tick.limit": "60s",
+    }
+    with dask.config.set(settings):
+        cluster = LocalCluster(
+            n_workers=workers or default_workers(),
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
+        with cluster, Client(cluster) as client:
+            yield client
+
+
+def run_all(client: Client, trials: Iterator[Trial], done: Callable[[list[Outcome]], None]) -> None:
+    """Runs all trials and shows `done` each batch of outcomes as it comes.
+
+    Only a few runs for each worker are handed in at a time. A run whose worker dies is given to another by dask; one
+    that kills every worker it gets becomes a row with that error.
+
+    Raises
+    ------
+    FingergaitError
+        Where the scheduler goes away, or a worker runs another build.
+    """
+    waiting: dict[str, tuple[Trial, int]] = {}
+    finished = as_completed()
+
+    def hand_in(trial: Trial, attempt: int) -> None:
+        # No two submissions share a key: a scheduler that still knows a failed one would answer with it.
+        key = f"fingergait-{trial.build}-{client.id}-{trial.index}-{attempt}"
+        waiting[key] = trial, attempt
+        finished.add(client.submit(run_trial, trial, key=key, pure=False))
+
+    def refill() -> None:
+        room = max(_AHEAD, _AHEAD * sum(client.nthreads().values())) - len(waiting)
+        for _ in range(room):
+            trial = next(trials, None)
+            if trial is None:
+                return
+            hand_in(trial, 1)
+
+    refill()
+    while waiting:
+        outcomes = []
+        for future in finished.next_batch(block=True):
+            trial, attempt = waiting.pop(future.key)
+            outcome = _outcome(future, trial, attempt)
+            if outcome is None:
+                hand_in(trial, attempt + 1)
+            else:
+                outcomes.append(outcome)
+        if outcomes:
+            done(outcomes)
+        refill()
+
+
+def _outcome(future: Future[Any], trial: Trial, attempt: int) -> Outcome | None:
+    """What a finished future says; None where the run must be handed in again."""
+    if future.status == "finished":
+        outcome: Outcome = future.result()
+        outcome.timing["attempts"] = attempt
+        return outcome
+    error: Any = future.exception() if future.status == "error" else None
+    if isinstance(error, KilledWorker):
+        row = {"error": "KilledWorker: each worker that took this run died", **dict.fromkeys([*METRICS, *OBSERVED])}
+        return Outcome(trial.index, row, {"attempts": attempt})
+    if isinstance(error, FingergaitError):
+        raise error
+    if attempt == _ATTEMPTS:
+        found = "a cancelled run" if error is None else f"{type(error).__name__}: {error}"
+        raise FingergaitError(f"scheduler: expected an outcome of run {trial.index}, found {found}; --resume goes on")
+    return None

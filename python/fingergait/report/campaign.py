@@ -1,0 +1,121 @@
+"""A campaign's page: one HTML file that opens without a network."""
+
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import pyarrow as pa
+
+from fingergait._core import ConfigError
+from fingergait.campaign.sensitivity import influences
+from fingergait.campaign.spec import CampaignSpec
+from fingergait.campaign.statistics import (
+    PAPER_ORIENTATION,
+    PAPER_POSITION,
+    column,
+    fault_rows,
+    percentile,
+)
+from fingergait.campaign.store import write_atomic
+from fingergait.paths import find
+from fingergait.report.campaign_plots import box_figure, error_figure, image, influence_figure, trend_figure
+
+_SHOWN = 12  # failures listed for each cause
+
+
+def write_campaign_page(
+    spec: CampaignSpec, rows: pa.Table, timings: pa.Table, figures: dict[str, Any], path: Path
+) -> None:
+    """Writes the page.
+
+    Parameters
+    ----------
+    spec
+        What was run.
+    rows, timings
+        What came of it, and how long it took.
+    figures
+        As `command.run_campaign` gives them.
+    path
+        Of the page.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["milli"] = lambda value: "-" if value is None else f"{1e3 * value:.2f}"
+    found = influences(rows)
+    certified, words = certified_box(spec)
+    plots = {
+        "errors": error_figure(rows, (spec.limits.position_error_p99, spec.limits.orientation_error_p99)),
+        "box": box_figure(rows, certified),
+        "influence": influence_figure(found),
+        "trend": trend_figure(rows, found),
+    }
+    text = environment.get_template("campaign.html").render(
+        spec=spec,
+        described=json.dumps(spec.model_dump(mode="json", exclude_defaults=True), indent=2),
+        figures=figures,
+        paper=(PAPER_POSITION, PAPER_ORIENTATION),
+        plots={name: image(figure) for name, figure in plots.items() if figure is not None},
+        certified=words,
+        faults=fault_rows(rows),
+        failures=failures(rows),
+        shown=_SHOWN,
+        timing=timing_figures(timings),
+    )
+    write_atomic(path, text)
+
+
+def failures(rows: pa.Table) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The rows that failed, by cause, the commonest cause first."""
+    names = ["index", "cause", "error", "lost_reason", "duration_s", "replay"]
+    groups: defaultdict[str, list[dict[str, Any]]] = defaultdict(list)
+    for row in rows.select(names).to_pylist():
+        if row["cause"] is not None:
+            groups[row["cause"]].append(row)
+    return sorted(groups.items(), key=lambda item: (-len(item[1]), item[0]))
+
+
+def certified_box(spec: CampaignSpec) -> tuple[dict[str, Any] | None, str]:
+    """The uncertainty that the controller's artefact is certified for, as fractions, and the certificate in words."""
+    name = spec.base().controller.file
+    try:
+        artefact = json.loads(find(name, "controllers", ".json", "controller.file").read_text(encoding="utf-8"))
+        provenance = artefact["provenance"]
+        uncertainty = provenance.get("uncertainty") or provenance["spec"]["uncertainty"]
+        inertia = uncertainty["inertia"]
+        box: dict[str, Any] = {
+            "mass": float(uncertainty["mass"]),
+            "inertia": [float(x) for x in inertia] if isinstance(inertia, list) else [float(inertia)] * 3,
+        }
+    except (ConfigError, OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None, f"The controller {name} states no certified uncertainty."
+    peak = provenance.get("figures", {}).get("mu_peak")
+    bound = f", mu at most {peak:.3f}" if isinstance(peak, float) else ""
+    each = " and ".join(sorted({f"{100 * x:g} %" for x in box["inertia"]}))
+    return box, (
+        f"The controller {name} is certified for a mass off by {100 * box['mass']:g} % and moments of inertia off by "
+        f"{each}{bound}: the green frame. The certificate is of a linear model with contacts that hold; the dots are "
+        "simulated runs with everything else drawn at once."
+    )
+
+
+def timing_figures(timings: pa.Table) -> dict[str, float | None]:
+    """Wall-clock time of a run, s, its simulated seconds a second, and runs an hour of one core."""
+    wall = column(timings, "wall_s")
+    wall = wall[np.isfinite(wall)]
+    mean = float(wall.mean()) if wall.size else None
+    return {
+        "median_s": percentile(wall, 50),
+        "max_s": percentile(wall, 100),
+        "real_time_factor": percentile(column(timings, "real_time_factor"), 50),
+        "runs_per_core_hour": 3600.0 / mean if mean else None,
+        "step_p999_us": percentile(column(timings, "step_p999_us"), 50),
+    }
