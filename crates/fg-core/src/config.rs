@@ -223,13 +223,14 @@ pub struct RobustConfig {
     pub anti_windup: bool,
     /// Use the artefact's reference prefilter.
     pub prefilter: bool,
-    /// Overcome the joints' damping along the desired motion. Deviation: not in the paper.
-    pub feedforward: bool,
+    /// Share of the joints' nominal damping that is overcome along the desired motion; zero: none. Deviation: not in the
+    /// paper.
+    pub feedforward: f64,
 }
 
 impl Default for RobustConfig {
     fn default() -> Self {
-        Self { anti_windup: true, prefilter: true, feedforward: true }
+        Self { anti_windup: true, prefilter: true, feedforward: 1.0 }
     }
 }
 
@@ -306,6 +307,7 @@ impl Config {
             ("force.slip_hold", f.slip_hold, 0.0, 1e3),
             ("force.friction_recovery", f.friction_recovery, 1e-3, 1e9),
             ("force.friction_floor", f.friction_floor, 0.01, 10.0),
+            ("robust.feedforward", self.robust.feedforward, 0.0, 10.0),
             ("torque.K_p", t.K_p, 0.0, 1e3),
             ("torque.K_i", t.K_i, 0.0, 1e5),
             ("torque.K_d", t.K_d, 0.0, 10.0),

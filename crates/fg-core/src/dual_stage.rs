@@ -267,14 +267,15 @@ impl DualStagePlanner {
     fn bound_torques(&mut self, measurement: &Measurement) {
         let n_joints = self.hand.n_joints();
         self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
-        if self.config.robust.feedforward {
+        let share = self.config.robust.feedforward;
+        if share > 0.0 {
             let scene = scene!(self, measurement);
             // Eq. (5) has its own velocity term for the finger that slides.
             let sliding = self.supervisor.sliding_finger();
             for k in (0..self.hand.n_fingers()).filter(|k| Some(*k) != sliding) {
                 damping_torque(&self.hand, k, &scene, &mut self.tau_free);
                 for (i, tau) in self.tau_free.iter().enumerate() {
-                    self.tau_own[k * n_joints + i] += tau;
+                    self.tau_own[k * n_joints + i] += share * tau;
                 }
             }
         }
