@@ -182,7 +182,7 @@ impl DualStagePlanner {
             self.supervisor.abort();
         }
         self.supervise(measurement);
-        self.feel_slip(measurement);
+        self.feel_slip();
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
@@ -226,14 +226,14 @@ impl DualStagePlanner {
     }
 
     /// Adapts the assumed friction to the slip of the fingers that hold the object.
-    fn feel_slip(&mut self, measurement: &Measurement) {
+    fn feel_slip(&mut self) {
         let free = self.supervisor.free_finger();
         if self.guard.discontinuous() {
             self.slip.skip();
         }
         let guard = &self.guard;
         let holds = |j| Some(j) != free && guard.trusts(j);
-        self.slip.update(&self.grasp, &self.state, &measurement.X_WO, holds);
+        self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
             self.assume_friction();

@@ -41,6 +41,9 @@ pub struct SafetyConfig {
     pub stale_motion: [f64; 2],
     /// Time constant with which a replaced pose passes over into a good one, s.
     pub pose_blend: f64,
+    /// Time constant with which the pose that the fingers carry along follows a noisy or slow sensor, s; zero: the
+    /// sensor's pose is used as it is.
+    pub pose_filter: f64,
     /// A tactile reading of this or more is full scale, N.
     pub tactile_max: f64,
     /// A finger that feels and should press more than this is loaded, N.
@@ -81,6 +84,7 @@ impl Default for SafetyConfig {
             pose_timeout: 0.1,
             stale_motion: [2e-3, 0.03],
             pose_blend: 0.05,
+            pose_filter: 0.1,
             tactile_max: 25.0,
             loaded_force: 0.3,
             lost_distance: 2e-3,
@@ -119,6 +123,7 @@ impl SafetyConfig {
             ("stale_motion[0]", self.stale_motion[0], positive, 1.0),
             ("stale_motion[1]", self.stale_motion[1], positive, 3.2),
             ("pose_blend", self.pose_blend, positive, 10.0),
+            ("pose_filter", self.pose_filter, 0.0, 10.0),
             ("tactile_max", self.tactile_max, positive, 1e6),
             ("loaded_force", self.loaded_force, 0.0, 1e3),
             ("lost_distance", self.lost_distance, positive, 1.0),

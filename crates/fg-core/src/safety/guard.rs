@@ -12,7 +12,7 @@ use super::{Fault, Faults, SafeMode};
 use crate::error::Error;
 use crate::hand::{HandModel, HandState};
 use crate::signals::{Measurement, Reference};
-use nalgebra::Vector6;
+use nalgebra::{Isometry3, Vector6};
 
 /// Time constant with which the fingers press harder and let off again, s.
 const SQUEEZE_TIME: f64 = 0.02;
@@ -137,6 +137,11 @@ impl Guard {
     /// True where neither the sensor nor the fingers tell the object's pose: the last wrench is all there is.
     pub fn blind(&self) -> bool {
         self.blind
+    }
+
+    /// The sensor's pose, or what stands for it while it fails: unlike the measurement's, without lag.
+    pub fn sensed_pose(&self) -> &Isometry3<f64> {
+        self.pose.sensed()
     }
 
     /// True where time did not advance by one period: velocities over this step mean nothing.
@@ -290,7 +295,7 @@ impl Guard {
         let X_WO = &measurement.X_WO;
         let X_WO = self.pose.admit(X_WO, motion.as_ref(), &centre, elapsed, &mut self.faults);
         self.trusted.X_WO = X_WO;
-        self.odometry.settle(&X_WO, self.pose.from_sensor());
+        self.odometry.settle(self.pose.sensed(), self.pose.from_sensor());
         self.blind = self.pose.failed() && motion.is_none();
     }
 

@@ -11,6 +11,7 @@
 //! | [`touch`] | tactile sensors |
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
 //! | [`pose`] | the object's pose, against that motion |
+//! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
 //! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
 //! | [`limiter`] | the torque command |
@@ -18,6 +19,7 @@
 pub mod clock;
 pub mod config;
 pub mod debounce;
+pub mod fusion;
 pub mod guard;
 pub mod joints;
 pub mod limiter;

@@ -2,6 +2,7 @@
 
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
+use super::fusion::Fusion;
 use super::odometry::{moved, size};
 use super::{Fault, Faults};
 use crate::spatial::{is_finite, pose_error};
@@ -41,6 +42,9 @@ pub struct PoseGuard {
     blend: Option<Vector6<f64>>,
     failed: Debounce,
     source: Source,
+    fusion: Fusion,
+    /// The sensor's pose, or what stands for it.
+    sensed: Isometry3<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +72,8 @@ impl PoseGuard {
             blend: None,
             failed: Debounce::default(),
             source: Source::Sensor,
+            fusion: Fusion::new(config, dt),
+            sensed: Isometry3::identity(),
         }
     }
 
@@ -89,6 +95,11 @@ impl PoseGuard {
     /// True where this step's pose comes from the sensor.
     pub fn from_sensor(&self) -> bool {
         self.source == Source::Sensor
+    }
+
+    /// The sensor's pose of this step, or what stands for it while it fails: with the sensor's noise, without any lag.
+    pub fn sensed(&self) -> &Isometry3<f64> {
+        &self.sensed
     }
 
     /// True where `X` is the last sample again, bit for bit.
@@ -121,7 +132,9 @@ impl PoseGuard {
             (Some(_), Some(carried)) => (Source::Fingers, carried),
             (Some(_), None) => (Source::Fingers, Isometry3::translation(centre.x, centre.y, centre.z)),
         };
-        self.pass_over(source, &target)
+        self.sensed = self.pass_over(source, &target);
+        let fresh = fault.is_none() && self.still == 0.0;
+        self.fusion.update(&self.sensed, motion, fresh || self.blend.is_some())
     }
 
     /// What is wrong with the sample; where nothing is, `carried` becomes the sample.
