@@ -32,9 +32,19 @@ impl Residual {
             f64::INFINITY
         }
     }
+
+    /// True where all residuals are within `tolerance`, N, but for a stationarity that rounding (N, see [`rounding`]) would
+    /// make of an exact solution, up to `loose`.
+    pub fn certifies(&self, tolerance: f64, loose: f64, rounding: impl Fn() -> f64) -> bool {
+        let worst = self.worst();
+        worst <= tolerance
+            || (worst <= loose
+                && self.primal.max(self.complementarity) <= tolerance
+                && self.stationarity <= rounding())
+    }
 }
 
-/// N: what rounding makes of the stationarity of an exact solution. A residual below it says nothing against an answer.
+/// N: what rounding makes of the stationarity of an exact solution. A residual below it says nothing against it.
 pub fn rounding(qp: &ForceQp, f: &Forces, multipliers: impl Iterator<Item = (usize, f64)>) -> f64 {
     let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let G = qp.G.iter().map(|g| dot(g, g)).sum::<f64>().sqrt();

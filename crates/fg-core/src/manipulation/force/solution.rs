@@ -28,7 +28,7 @@ pub enum SolverUsed {
     ActiveSet,
     /// Clarabel, polished.
     ClarabelPolished,
-    /// Clarabel's own answer, within `raw_tolerance`.
+    /// Clarabel's own answer, within `loose_tolerance`.
     Clarabel,
     /// None: forces are held.
     Held,
@@ -76,10 +76,12 @@ pub struct SolverCounters {
     pub clarabel: u64,
     /// Forces held.
     pub held: u64,
-    /// Active set to clarabel: bound on changes reached or numbers broken.
-    pub active_set_stopped: u64,
-    /// Active set to clarabel: KKT residual above tolerance.
-    pub active_set_uncertified: u64,
+    /// Fast active set to careful one: bound on changes reached, or rounding hides what to do.
+    pub fast_stopped: u64,
+    /// Fast active set to careful one: KKT residual above tolerance.
+    pub fast_uncertified: u64,
+    /// Careful active set to clarabel: neither certified forces nor certified that there are none.
+    pub careful_undecided: u64,
     /// Held: the active set proves that no forces are within the bounds.
     pub active_set_infeasible: u64,
     /// Held: bounds that contradict each other on their face.
