@@ -58,7 +58,13 @@ pub fn violation(qp: &ForceQp, f: &Forces) -> f64 {
     let mut worst = 0.0_f64;
     for row in &qp.rows {
         let along = qp.along(row, f);
-        worst = worst.max(row.lower - along).max(along - row.upper);
+        let below = row.lower - along;
+        let above = along - row.upper;
+        // Not f64::max, whose care for NaN costs a third of this function.
+        let missed = if below > above { below } else { above };
+        if missed > worst {
+            worst = missed;
+        }
     }
     worst
 }
