@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// A pyramid inside the Coulomb cone of a contact, in the contact frame C (z along the inward normal).
 ///
 /// The paper writes the cone as `f = B beta, beta >= 0` (8c, 8d), the columns of B being the pyramid's edges. The same
-/// set in facet form is `n_k . f >= 0` with `n_k = e_k x e_{k+1}`; the facets need no extra variables.
+/// set in facet form is `n_k . f >= 0` with `n_k = e_k x e_{k+1}` of neighbouring edges; it needs no extra variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrictionPyramid {
     edges: Vec<Vector3<f64>>,
@@ -41,28 +41,51 @@ impl FrictionPyramid {
         Ok(())
     }
 
-    /// The pyramid spanned by `edges`, in anticlockwise order seen against the normal.
+    /// The pyramid spanned by `edges`: all `f = B beta, beta >= 0`. Their order and length are free, and an edge inside the
+    /// pyramid of the others adds no facet.
+    ///
+    /// A [`Error::Config`] unless there are 3 to 12 edges, which enclose a volume and lie within 90 degrees of their mean.
     pub fn from_edges(edges: &[Vector3<f64>]) -> Result<Self, Error> {
-        let m = edges.len();
-        if !(3..=Self::MAX_EDGES).contains(&m) {
-            return Err(Error::config("edges", format!("3 to {} edges", Self::MAX_EDGES), m));
+        if !(3..=Self::MAX_EDGES).contains(&edges.len()) {
+            return Err(Error::config("edges", format!("3 to {} edges", Self::MAX_EDGES), edges.len()));
         }
-        let facets: Vec<_> = (0..m).map(|k| edges[k].cross(&edges[(k + 1) % m])).collect();
-        let interior: Vector3<f64> = edges.iter().sum();
-        for (k, facet) in facets.iter().enumerate() {
-            if !facet.iter().all(|x| x.is_finite()) || facet.dot(&interior) <= 1e-12 {
+        let mut mean = Vector3::zeros();
+        for (k, edge) in edges.iter().enumerate() {
+            let length = edge.norm();
+            if !(length.is_finite() && length > 0.0) {
+                let found = format!("{:?}", edge.as_slice());
+                return Err(Error::config(format!("edges[{k}]"), "a finite vector that is not zero", found));
+            }
+            mean += edge / length;
+        }
+        let mean = mean / mean.norm();
+        // Where the edges pierce the plane at distance 1 along their mean.
+        let (x, y) = basis(&mean);
+        let mut points = Vec::with_capacity(edges.len());
+        for (k, edge) in edges.iter().enumerate() {
+            let height = edge.dot(&mean);
+            // Also refuses a mean that is not a number.
+            if height.is_nan() || height <= 1e-6 * edge.norm() {
+                let found = format!("{:?}", edge.as_slice());
                 return Err(Error::config(
                     format!("edges[{k}]"),
-                    "edges of a convex pyramid in anticlockwise order",
-                    format!("{:?}", edges[k].as_slice()),
+                    "an edge within 90 degrees of the edges' mean",
+                    found,
                 ));
             }
+            points.push([edge.dot(&x) / height, edge.dot(&y) / height]);
         }
-        let facets = facets.into_iter().map(|n| n.normalize()).collect();
+        let hull = convex_hull(&points);
+        if hull.len() < 3 {
+            return Err(Error::config("edges", "edges that enclose a volume", "edges in one plane"));
+        }
+        let facets = (0..hull.len())
+            .map(|k| edges[hull[k]].cross(&edges[hull[(k + 1) % hull.len()]]).normalize())
+            .collect();
         Ok(Self { edges: edges.to_vec(), facets })
     }
 
-    /// The pyramid's edges e_k: the columns of B_i.
+    /// The pyramid's edges e_k, as given: the columns of B_i.
     pub fn edges(&self) -> &[Vector3<f64>] {
         &self.edges
     }
@@ -76,6 +99,44 @@ impl FrictionPyramid {
     pub fn contains(&self, f: &Vector3<f64>, tolerance: f64) -> bool {
         self.facets.iter().all(|n| n.dot(f) >= -tolerance)
     }
+}
+
+/// Two unit vectors that make a right-handed frame with the unit vector `z`.
+fn basis(z: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let other = if z.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let x = other.cross(z).normalize();
+    (x, z.cross(&x))
+}
+
+/// Indices of the corners of the points' convex hull, anticlockwise from the corner that comes first in `points`.
+fn convex_hull(points: &[[f64; 2]]) -> Vec<usize> {
+    let size = points.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+    // Twice the area of a triangle; one below this part of the whole counts as flat.
+    let area = |i: usize, j: usize, k: usize| {
+        let ([ax, ay], [bx, by], [cx, cy]) = (points[i], points[j], points[k]);
+        (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    };
+    let flat = 1e-9 * size * size;
+    let mut order: Vec<_> = (0..points.len()).collect();
+    order.sort_by(|a, b| {
+        points[*a][0].total_cmp(&points[*b][0]).then(points[*a][1].total_cmp(&points[*b][1]))
+    });
+    let half = |order: &mut dyn Iterator<Item = usize>| {
+        let mut chain: Vec<usize> = Vec::new();
+        for k in order {
+            while chain.len() >= 2 && area(chain[chain.len() - 2], chain[chain.len() - 1], k) <= flat {
+                chain.pop();
+            }
+            chain.push(k);
+        }
+        chain.pop();
+        chain
+    };
+    let mut hull = half(&mut order.iter().copied());
+    hull.extend(half(&mut order.iter().rev().copied()));
+    let first = hull.iter().enumerate().min_by_key(|(_, k)| **k).map_or(0, |(at, _)| at);
+    hull.rotate_left(first);
+    hull
 }
 
 fn inscribed_edge(mu: f64, k: usize, n_edges: usize) -> Vector3<f64> {
@@ -92,5 +153,54 @@ mod tests {
         let mut pyramid = FrictionPyramid::inscribed(0.8, 8).unwrap();
         pyramid.set_friction(0.5).unwrap();
         assert_eq!(pyramid, FrictionPyramid::inscribed(0.5, 8).unwrap());
+    }
+    #[test]
+    fn order_length_and_inner_edges_do_not_change_the_set() {
+        let mu = 0.5;
+        let pyramid = FrictionPyramid::inscribed(mu, 4).unwrap();
+        let e = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let shuffled = [
+            e(mu, 0.0, 1.0),
+            e(-2.0 * mu, 0.0, 2.0),
+            e(0.1, 0.1, 1.0),
+            e(0.0, mu, 1.0),
+            e(0.0, -mu, 1.0),
+            e(mu, 0.0, 1.0),
+        ];
+        let other = FrictionPyramid::from_edges(&shuffled).unwrap();
+        assert_eq!(other.facets().len(), 4);
+        assert_eq!(other.edges().len(), 6);
+        for facet in pyramid.facets() {
+            assert!(other.facets().iter().any(|n| (n - facet).norm() < 1e-12), "{facet}");
+        }
+        let clockwise: Vec<_> = pyramid.edges().iter().rev().copied().collect();
+        assert_eq!(FrictionPyramid::from_edges(&clockwise).unwrap().facets().len(), 4);
+    }
+
+    #[test]
+    fn every_edge_lies_in_the_pyramid_and_the_cone() {
+        for (mu, m) in [(0.1, 3), (0.5, 4), (1.0, 7), (3.0, 12)] {
+            let pyramid = FrictionPyramid::inscribed(mu, m).unwrap();
+            assert_eq!(pyramid.facets().len(), m);
+            for edge in pyramid.edges() {
+                assert!(pyramid.contains(edge, 1e-12));
+                assert!(edge.xy().norm() <= mu * edge.z + 1e-12);
+            }
+            assert!(pyramid.contains(&Vector3::z(), 0.0));
+            assert!(!pyramid.contains(&-Vector3::z(), 1e-3));
+        }
+    }
+
+    #[test]
+    fn edges_that_make_no_pyramid_are_refused_by_name() {
+        let e = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let message = |edges: &[Vector3<f64>]| FrictionPyramid::from_edges(edges).unwrap_err().to_string();
+        assert!(message(&[e(1.0, 0.0, 1.0), e(0.0, 1.0, 1.0)]).starts_with("edges: expected 3 to 12 edges"));
+        assert!(
+            message(&[e(1.0, 0.0, 1.0), e(0.0, f64::NAN, 1.0), e(-1.0, 0.0, 1.0)]).starts_with("edges[1]")
+        );
+        assert!(message(&[e(1.0, 0.0, 1.0), e(0.0, 0.0, 1.0), e(-1.0, 0.0, 1.0)]).contains("volume"));
+        assert!(message(&[e(1.0, 0.0, 0.0), e(-1.0, 1.0, 0.0), e(0.0, -1.0, 0.0)]).contains("90 degrees"));
+        assert!(FrictionPyramid::inscribed(0.0, 4).is_err());
     }
 }

@@ -42,7 +42,7 @@ pub struct ForceSettings {
     /// N: an answer with a KKT residual up to this is certified. See [`kkt::Residual::certifies`].
     pub tolerance: f64,
     /// N: where rounding or an interior point allow no better, an answer is still taken up to this KKT residual.
-    pub loose_tolerance: f64,
+    pub raw_tolerance: f64,
     /// Bound on the active set's changes.
     pub max_changes: usize,
     /// Bound on clarabel's iterations.
@@ -56,7 +56,7 @@ impl Default for ForceSettings {
             alpha: [0.01, 0.01, 1000.0],
             solver: SolverChoice::ActiveSet,
             tolerance: 1e-7,
-            loose_tolerance: 1e-5,
+            raw_tolerance: 1e-5,
             max_changes: 100,
             max_iterations: 30,
         }
@@ -89,9 +89,7 @@ impl ForceOptimizer {
                 format!("{alpha:?}"),
             ));
         }
-        for (name, value) in
-            [("tolerance", settings.tolerance), ("loose_tolerance", settings.loose_tolerance)]
-        {
+        for (name, value) in [("tolerance", settings.tolerance), ("raw_tolerance", settings.raw_tolerance)] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::config(name, "a finite number > 0", value));
             }
@@ -238,7 +236,7 @@ impl ForceOptimizer {
         let f = *self.interior_point.forces();
         let multipliers = self.interior_point.multipliers().iter().map(|(row, mu, _)| (*row, *mu));
         let kkt = kkt::residual(&self.qp, &f, multipliers).worst();
-        if kkt <= self.settings.loose_tolerance {
+        if kkt <= self.settings.raw_tolerance {
             self.take(&f, SolverUsed::Clarabel, kkt, iterations);
             return true;
         }
@@ -290,7 +288,7 @@ fn run<E: Equalities>(active_set: &mut ActiveSet<E>, qp: &ForceQp, settings: &Fo
         let f = active_set.forces();
         let residual = kkt::residual(qp, f, active_set.multipliers());
         let rounding = || kkt::rounding(qp, f, active_set.multipliers());
-        if residual.certifies(settings.tolerance, settings.loose_tolerance, rounding) {
+        if residual.certifies(settings.tolerance, settings.raw_tolerance, rounding) {
             return Verdict::Certified(residual.worst());
         }
     }

@@ -28,7 +28,7 @@ pub enum SolverUsed {
     ActiveSet,
     /// Clarabel, polished.
     ClarabelPolished,
-    /// Clarabel's own answer, within `loose_tolerance`.
+    /// Clarabel's own answer, within `raw_tolerance`.
     Clarabel,
     /// None: forces are held.
     Held,
