@@ -93,6 +93,27 @@ def campaign(
 
 
 @app.command()
+def reproduce(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the page and the JSON file go.")] = Path(
+        "runs/reproduce"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds and shorter runs: some minutes.")] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Run the paper's experiments and past them; write a page with each claim beside what was measured."""
+    from fingergait.report.claim_table import show_claims
+    from fingergait.reproduce.run import reproduce as run_all
+
+    summary = run_all(out, quick, workers)
+    if as_json:
+        print_json(summary)
+    else:
+        show_claims(summary, Console())
+    raise typer.Exit(DONE if summary["held"] == len(summary["claims"]) else MISSED)
+
+
+@app.command()
 def check(
     file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],
 ) -> None:

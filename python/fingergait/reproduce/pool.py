@@ -1,0 +1,101 @@
+"""Runs cases in parallel processes, with a progress bar."""
+
+import contextlib
+import multiprocessing
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from fingergait._core import FingergaitError
+from fingergait.log import Log
+from fingergait.report.film import film_strip
+from fingergait.reproduce.analysis import analyse, trace_of
+from fingergait.reproduce.case import Case, Outcome
+from fingergait.simulate import simulate
+
+Job = tuple[str, float, Callable[..., Any], tuple[Any, ...]]
+"""Label, simulated seconds (the bar's measure), a function of a module, and its arguments."""
+
+
+def run_case(case: Case) -> Outcome:
+    """Runs one case in this process. A scenario that can't start is an outcome without metrics."""
+    try:
+        run = simulate(case.scenario)
+    except FingergaitError as error:
+        return Outcome(case, {}, {}, note=str(error))
+    film, note = _film(run.log) if case.film else (None, "")
+    trace = trace_of(run.log) if case.trace else {}
+    return Outcome(case, run.metrics, analyse(run.log, case.scenario), trace, film, note)
+
+
+def _film(log: Log) -> tuple[bytes | None, str]:
+    with tempfile.TemporaryDirectory() as folder:
+        source, picture = Path(folder) / "log.parquet", Path(folder) / "film.png"
+        log.write(source)
+        problem = film_strip(source, picture)
+        return (None, problem) if problem is not None else (picture.read_bytes(), "")
+
+
+def run_jobs(jobs: Sequence[Job], workers: int, quiet: bool = False) -> list[Any]:
+    """The results of all jobs in their order; the longest start first.
+
+    Parameters
+    ----------
+    jobs
+        What to run.
+    workers
+        Processes; 1 runs everything in this one.
+    quiet
+        Show no progress bar.
+    """
+    results: dict[int, Any] = {}
+    with _bar(sum(job[1] for job in jobs), quiet) as advance:
+        for index, result in _results(jobs, workers):
+            results[index] = result
+            advance(jobs[index])
+    return [results[index] for index in range(len(jobs))]
+
+
+def _results(jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, Any]]:
+    order = sorted(range(len(jobs)), key=lambda index: -jobs[index][1])
+    if workers == 1:
+        for index in order:
+            _, _, function, arguments = jobs[index]
+            yield index, function(*arguments)
+        return
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        pending = {pool.submit(jobs[index][2], *jobs[index][3]): index for index in order}
+        try:
+            for future in as_completed(pending):
+                yield pending[future], future.result()
+        except BaseException:
+            for future in pending:
+                future.cancel()
+            raise
+
+
+@contextlib.contextmanager
+def _bar(total: float, quiet: bool) -> Iterator[Callable[[Job], None]]:
+    if quiet:
+        yield lambda job: None
+        return
+    columns = (
+        TextColumn("reproduce"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f}/{task.total:.0f} s simulated  {task.fields[state]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=total, state="")
+        yield lambda job: progress.update(task, advance=job[1], state=job[0])

@@ -1,0 +1,148 @@
+"""The work of `fingergait reproduce`: all runs, the verdicts, the page and the JSON file."""
+
+import json
+import os
+import platform
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fingergait._core import ConfigError
+from fingergait.reproduce.ablations import Cell, ablation_cases, ablation_table
+from fingergait.reproduce.case import Case, Outcome
+from fingergait.reproduce.claim import Claim
+from fingergait.reproduce.experiment import Experiment
+from fingergait.reproduce.experiments import all_experiments
+from fingergait.reproduce.limits import Bisection, Limit, all_limits, bisect_by_key
+from fingergait.reproduce.pool import Job, run_case, run_jobs
+from fingergait.simulate import load_controller
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Everything that the page shows.
+
+    claims, outcomes
+        By experiment key; by case key.
+    bisections
+        By limit key.
+    ablations
+        By variant and condition.
+    """
+
+    quick: bool
+    seconds: float
+    experiments: list[Experiment]
+    claims: dict[str, list[Claim]]
+    outcomes: dict[str, Outcome]
+    limits: list[Limit]
+    bisections: dict[str, list[Bisection]]
+    ablations: dict[str, dict[str, Cell]]
+
+    @property
+    def all_claims(self) -> list[Claim]:
+        """The claims of all experiments, in the page's order."""
+        return [claim for experiment in self.experiments for claim in self.claims[experiment.key]]
+
+
+def reproduce(out: Path, quick: bool, workers: int, quiet: bool = False) -> dict[str, Any]:
+    """Runs every experiment, writes `index.html` and `reproduce.json` into `out`, and returns the JSON.
+
+    Parameters
+    ----------
+    out
+        Folder of the results.
+    quick
+        Fewer seeds, shorter runs, coarser limits.
+    workers
+        Processes.
+    quiet
+        Show no progress.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"--out: expected a folder that can be written, found {out} ({error.strerror})") from None
+    result = run_all(quick, workers, quiet)
+    from fingergait.reproduce.page import write_page  # matplotlib is slow to import
+
+    report = out / "index.html"
+    write_page(result, report)
+    summary = as_json(result, report)
+    (out / "reproduce.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    return summary
+
+
+def run_all(quick: bool, workers: int, quiet: bool = False) -> Reproduction:
+    """Runs every experiment, bisection and ablation; writes nothing."""
+    begin = time.perf_counter()
+    experiments, limits = all_experiments(quick), all_limits()
+    cases = [case for experiment in experiments for case in experiment.cases]
+    ablations = ablation_cases(quick)
+    seeds, halvings = (1, 3) if quick else (3, 6)
+    searches = [(limit, seed) for limit in limits for seed in range(seeds)]
+    jobs = [_case_job(case) for case in (*cases, *ablations)]
+    jobs += [_search_job(limit, seed, halvings) for limit, seed in searches]
+    results = run_jobs(jobs, workers, quiet)
+    outcomes = {case.key: outcome for case, outcome in zip(cases, results, strict=False)}
+    removed = {case.key: outcome for case, outcome in zip(ablations, results[len(cases) :], strict=False)}
+    found: list[Bisection] = results[len(cases) + len(ablations) :]
+    return Reproduction(
+        quick=quick,
+        seconds=time.perf_counter() - begin,
+        experiments=experiments,
+        claims={e.key: e.judge({case.key: outcomes[case.key] for case in e.cases}) for e in experiments},
+        outcomes=outcomes,
+        limits=limits,
+        bisections={limit.key: [b for b in found if b.key == limit.key] for limit in limits},
+        ablations=ablation_table(removed),
+    )
+
+
+def _case_job(case: Case) -> Job:
+    return (case.key, case.scenario.duration + (10.0 if case.film else 0.0), run_case, (case,))
+
+
+def _search_job(limit: Limit, seed: int, halvings: int) -> Job:
+    runs = 0.7 * (2 + halvings)  # a lost object ends its run early
+    label = f"limit: {limit.title}, seed {seed}"
+    return (label, runs * limit.duration(limit.easy), bisect_by_key, (limit.key, seed, halvings))
+
+
+def as_json(result: Reproduction, report: Path) -> dict[str, Any]:
+    """The reproduction as JSON: `claims`, `report`, and what the page shows besides."""
+    claims = [claim.row() for claim in result.all_claims]
+    return {
+        "claims": claims,
+        "report": str(report),
+        "held": sum(bool(claim["held"]) for claim in claims),
+        "quick": result.quick,
+        "seconds": result.seconds,
+        "limits": {
+            key: [asdict(bisection) for bisection in bisections] for key, bisections in result.bisections.items()
+        },
+        "ablations": {
+            variant: {condition: asdict(cell) for condition, cell in row.items()}
+            for variant, row in result.ablations.items()
+        },
+        **settings_of(result),
+    }
+
+
+def settings_of(result: Reproduction) -> dict[str, Any]:
+    """Versions, simulator settings, controller and machine of the runs."""
+    shown = next(outcome for outcome in result.outcomes.values() if outcome.metrics)
+    metrics, scenario = shown.metrics, shown.case.scenario
+    controller = load_controller(scenario)
+    return {
+        "controller": {
+            "artefact": scenario.controller.file,
+            "kind": controller.kind,
+            "rate_hz": scenario.controller.rate_hz,
+            "nominal_mass_kg": controller.mass,
+        },
+        "versions": metrics["versions"],
+        "simulator": metrics["simulator"],
+        "machine": {"system": platform.platform(terse=True), "processors": os.cpu_count()},
+    }
