@@ -136,7 +136,7 @@ impl Default for GaitConfig {
             follow_surface: true,
             approach_speed: 0.02,
             force_filter: 0.02,
-            threshold_margin: 8e-4,
+            threshold_margin: 1.2e-3,
             unload_time: 0.08,
             load_time: 0.1,
             min_slide_time: 0.1,
