@@ -17,6 +17,7 @@ import pyarrow as pa
 import pytest
 from distributed import KilledWorker
 
+from fingergait._core import FingergaitError
 from fingergait.campaign import cluster, trial
 from fingergait.campaign.build import build_id
 from fingergait.campaign.store import Store, row_schema
@@ -209,14 +210,18 @@ class Failed:
 
 
 def test_a_run_that_kills_its_workers_is_a_row_and_a_lost_one_is_handed_in_again() -> None:
-    run = trial.Trial(3, {}, {}, "build")
+    runs = [trial.Trial(index, {}, {}, "build") for index in (3, 4)]
     killed: Any = Failed(KilledWorker("key", None, []))
-    outcome = cluster._outcome(killed, run, 1)
-    assert outcome is not None and outcome.row["error"].startswith("KilledWorker")
+    (outcome,), again = cluster._outcome(killed, runs[:1], 1)
+    assert outcome.index == 3 and outcome.row["error"].startswith("KilledWorker") and again == []
+    assert cluster._outcome(killed, runs, 1) == ([], [[runs[0]], [runs[1]]])
     lost: Any = Failed(OSError("gone"))
-    assert cluster._outcome(lost, run, 1) is None
+    assert cluster._outcome(lost, runs, 1) == ([], [runs])
+    with pytest.raises(FingergaitError, match="--resume goes on"):
+        cluster._outcome(lost, runs, 3)
+    other: Any = Failed(trial.BuildMismatch("other"))
     with pytest.raises(trial.BuildMismatch):
-        cluster._outcome(Failed(trial.BuildMismatch("other")), run, 1)  # type: ignore[arg-type]
+        cluster._outcome(other, runs, 1)
 
 
 def call(monkeypatch: pytest.MonkeyPatch, arguments: list[str]) -> int:

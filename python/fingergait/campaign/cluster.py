@@ -4,6 +4,7 @@ import contextlib
 import logging
 import os
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any
 
 import dask
@@ -15,7 +16,8 @@ from fingergait.campaign.trial import METRICS, OBSERVED, Outcome, Trial, run_tri
 
 _CONNECT_S = 10.0
 _ATTEMPTS = 3  # times that a run is handed in again after the scheduler lost it
-_AHEAD = 4  # runs handed in for each worker: enough to keep it busy, few enough to lose little
+_AHEAD = 4  # tasks handed in for each core: enough to keep it busy, few enough to lose little
+_TASKS = 64  # cores from which on a task takes more than one run
 
 
 def default_workers() -> int:
@@ -48,7 +50,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             n_workers=workers or default_workers(),
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         )
         with cluster, Client(cluster) as client:
@@ -59,58 +61,66 @@ def run_all(client: Client, trials: Iterator[Trial], done: Callable[[list[Outcom
     """Runs all trials and shows `done` each batch of outcomes as it comes.
 
     Only a few runs for each worker are handed in at a time. A run whose worker dies is given to another by dask; one
-    that kills every worker it gets becomes a row with that error.
+    that kills every worker it gets becomes a row with that error. On many cores each task takes several runs, so that
+    the scheduler keeps up.
 
     Raises
     ------
     FingergaitError
         Where the scheduler goes away, or a worker runs another build.
     """
-    waiting: dict[str, tuple[Trial, int]] = {}
+    waiting: dict[str, tuple[list[Trial], int]] = {}
     finished = as_completed()
 
-    def hand_in(trial: Trial, attempt: int) -> None:
+    def hand_in(task: list[Trial], attempt: int) -> None:
         # No two submissions share a key: a scheduler that still knows a failed one would answer with it.
-        key = f"fingergait-{trial.build}-{client.id}-{trial.index}-{attempt}"
-        waiting[key] = trial, attempt
-        finished.add(client.submit(run_trial, trial, key=key, pure=False))
+        key = f"fingergait-{task[0].build}-{client.id}-{task[0].index}-{len(task)}-{attempt}"
+        waiting[key] = task, attempt
+        finished.add(client.submit(run_trials, task, key=key, pure=False))
 
     def refill() -> None:
-        room = max(_AHEAD, _AHEAD * sum(client.nthreads().values())) - len(waiting)
-        for _ in range(room):
-            trial = next(trials, None)
-            if trial is None:
+        cores = sum(client.nthreads().values())
+        for _ in range(max(_AHEAD, _AHEAD * cores) - len(waiting)):
+            task = list(islice(trials, max(1, cores // _TASKS)))
+            if not task:
                 return
-            hand_in(trial, 1)
+            hand_in(task, 1)
 
     refill()
     while waiting:
-        outcomes = []
+        outcomes: list[Outcome] = []
         for future in finished.next_batch(block=True):
-            trial, attempt = waiting.pop(future.key)
-            outcome = _outcome(future, trial, attempt)
-            if outcome is None:
-                hand_in(trial, attempt + 1)
-            else:
-                outcomes.append(outcome)
+            task, attempt = waiting.pop(future.key)
+            found, again = _outcome(future, task, attempt)
+            outcomes += found
+            for rest in again:
+                hand_in(rest, attempt + 1)
         if outcomes:
             done(outcomes)
         refill()
 
 
-def _outcome(future: Future[Any], trial: Trial, attempt: int) -> Outcome | None:
-    """What a finished future says; None where the run must be handed in again."""
+def run_trials(task: list[Trial]) -> list[Outcome]:
+    """Runs several samples one after the other."""
+    return [run_trial(trial) for trial in task]
+
+
+def _outcome(future: Future[Any], task: list[Trial], attempt: int) -> tuple[list[Outcome], list[list[Trial]]]:
+    """What a finished future says, and what must be handed in again."""
     if future.status == "finished":
-        outcome: Outcome = future.result()
-        outcome.timing["attempts"] = attempt
-        return outcome
+        outcomes: list[Outcome] = future.result()
+        for outcome in outcomes:
+            outcome.timing["attempts"] = attempt
+        return outcomes, []
     error: Any = future.exception() if future.status == "error" else None
     if isinstance(error, KilledWorker):
+        if len(task) > 1:  # one of them kills: the others must not suffer for it
+            return [], [[trial] for trial in task]
         row = {"error": "KilledWorker: each worker that took this run died", **dict.fromkeys([*METRICS, *OBSERVED])}
-        return Outcome(trial.index, row, {"attempts": attempt})
+        return [Outcome(task[0].index, row, {"attempts": attempt})], []
     if isinstance(error, FingergaitError):
         raise error
-    if attempt == _ATTEMPTS:
+    if attempt >= _ATTEMPTS:
         found = "a cancelled run" if error is None else f"{type(error).__name__}: {error}"
-        raise FingergaitError(f"scheduler: expected an outcome of run {trial.index}, found {found}; --resume goes on")
-    return None
+        raise FingergaitError(f"scheduler: expected an outcome of run {task[0].index}, found {found}; --resume goes on")
+    return [], [task]

@@ -42,7 +42,11 @@ class Claim:
 
 @dataclass(frozen=True)
 class FaultRow:
-    """What came of one kind of fault; `gaiting`: runs and drops where it began during a gait."""
+    """What came of one kind of fault.
+
+    `gaiting`: runs and drops where it began during a gait; `seen`: runs in which the core's guard noticed something,
+    and the median time that it took, s.
+    """
 
     label: str
     promise: str
@@ -50,6 +54,7 @@ class FaultRow:
     drops: int
     errors: int
     gaiting: tuple[int, int]
+    seen: tuple[int, float | None]
     bad_commands: int
 
     @property
@@ -122,13 +127,14 @@ def claims(rows: pa.Table, figures: dict[str, Any], limits: Limits) -> list[Clai
 
 def fault_rows(rows: pa.Table) -> list[FaultRow]:
     """One row a kind of fault, in alphabetical order."""
-    columns = ("fault", "promise", "status", "gaiting_at_fault", "bad_commands")
+    columns = ("fault", "promise", "status", "gaiting_at_fault", "detected_after_s", "bad_commands")
     records = rows.select(list(columns)).to_pylist()
     labels = sorted({record["fault"] for record in records if record["fault"] is not None})
     found = []
     for label in labels:
         own = [record for record in records if record["fault"] == label]
         gaiting = [record for record in own if record["gaiting_at_fault"]]
+        seen = [record["detected_after_s"] for record in own if record["detected_after_s"] is not None]
         found.append(
             FaultRow(
                 label,
@@ -137,6 +143,7 @@ def fault_rows(rows: pa.Table) -> list[FaultRow]:
                 sum(record["status"] == "dropped" for record in own),
                 sum(record["status"] == "error" for record in own),
                 (len(gaiting), sum(record["status"] == "dropped" for record in gaiting)),
+                (len(seen), float(np.median(seen)) if seen else None),
                 sum(record["bad_commands"] or 0 for record in own),
             )
         )

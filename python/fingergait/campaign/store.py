@@ -26,6 +26,7 @@ TIMING = pa.schema(
     [
         ("index", pa.int64()),
         ("wall_s", pa.float64()),
+        ("cpu_s", pa.float64()),
         ("real_time_factor", pa.float64()),
         ("step_p999_us", pa.float64()),
         ("deadline_misses", pa.int64()),

@@ -79,8 +79,14 @@ def run_trial(trial: Trial) -> Outcome:
     """Runs one sample; whatever goes wrong in it becomes its row."""
     if build_id() != trial.build:
         raise BuildMismatch(f"workers: expected fingergait build {trial.build}, found {build_id()} on a worker")
-    begin = time.perf_counter()
-    timing: dict[str, Any] = {"wall_s": 0.0, "real_time_factor": None, "step_p999_us": None, "deadline_misses": None}
+    begin, worked = time.perf_counter(), time.thread_time()
+    timing: dict[str, Any] = {
+        "wall_s": 0.0,
+        "cpu_s": 0.0,
+        "real_time_factor": None,
+        "step_p999_us": None,
+        "deadline_misses": None,
+    }
     try:
         scenario = Scenario.build(trial.base, trial.overrides)
         result = simulate(scenario)
@@ -92,7 +98,7 @@ def run_trial(trial: Trial) -> Outcome:
         raise
     except BaseException as error:  # a panic of the compiled core is no Exception
         row = {"error": describe(error), **dict.fromkeys([*METRICS, *OBSERVED])}
-    timing["wall_s"] = time.perf_counter() - begin
+    timing["wall_s"], timing["cpu_s"] = time.perf_counter() - begin, time.thread_time() - worked
     return Outcome(trial.index, row, timing)
 
 
