@@ -10,6 +10,7 @@ import pyarrow as pa
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 
 from fingergait.campaign.sensitivity import DUMMY, Influence
@@ -55,7 +56,7 @@ def error_figure(rows: pa.Table, limits: tuple[float | None, float | None]) -> F
         axes.set_xlabel(label)
         axes.set_ylabel("runs")
         _plain_log_ticks(axes)
-        axes.legend(fontsize=8, frameon=False)
+        axes.legend(fontsize=8, framealpha=0.9, edgecolor="none")
     return figure
 
 
@@ -82,7 +83,8 @@ def box_figure(rows: pa.Table, certified: dict[str, Any] | None) -> Figure | Non
         points = axes.scatter(
             m[held], inertia[held], c=errors[held], s=14, cmap="viridis", lw=0.0, rasterized=held.sum() > _RASTER
         )
-        axes.scatter(m[lost], inertia[lost], marker="x", s=32, color=_LOST, lw=1.5, label="dropped", zorder=3)
+        if lost.any():
+            axes.scatter(m[lost], inertia[lost], marker="x", s=32, color=_LOST, lw=1.5, label="dropped", zorder=3)
         if certified is not None:
             wide, tall = 100.0 * certified["mass"], 100.0 * certified["inertia"][min(index, 2)]
             box = Rectangle((-wide, -tall), 2 * wide, 2 * tall, fill=False, ec=_BOX, lw=1.8, label="certified")
@@ -114,6 +116,7 @@ def influence_figure(influences: list[Influence], most: int = 12) -> Figure | No
         axes.axvline(item.noise, color=_PAPER, ls="--", lw=1.0, label="dummy")
         axes.set_yticks(at, [_short(item.names[i]) for i in pick], fontsize=8)
         axes.invert_yaxis()
+        axes.set_xlim(left=0.0)
         axes.set_title(f"{item.output} (PAWN)", fontsize=10)
         axes.legend(fontsize=8, frameon=False, loc="lower right")
     return figure
@@ -144,6 +147,9 @@ def trend_figure(rows: pa.Table, influences: list[Influence], most: int = 8) -> 
         _plain_log_ticks(axes, "y")
         axes.set_xlabel(_short(name), fontsize=8)
         axes.tick_params(labelsize=7)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        axes.ticklabel_format(axis="x", scilimits=(-3, 4))
+        axes.xaxis.offsetText.set_fontsize(7)
         if lost.any():
             _drop_rate(axes.twinx(), x[held | lost], lost[held | lost])
     for axes in grid[len(ranked) :]:
@@ -177,8 +183,6 @@ def _short(name: str) -> str:
 
 
 def _plain_log_ticks(axes: Axes, which: str = "x") -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
