@@ -92,7 +92,7 @@ class ControllerConfig(Table):
 
     file: str = "pid"
     rate_hz: Positive = 500.0
-    friction: Positive = 0.8
+    friction: Positive = 0.65
 
 
 class ReferenceConfig(Table):
