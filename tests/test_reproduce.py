@@ -169,11 +169,12 @@ def test_analysis_of_a_quiet_hold_finds_nothing_active() -> None:
     assert held.extra["pulses"] == []
 
 
-def test_a_scenario_that_cannot_start_is_an_outcome_with_its_reason() -> None:
-    stuck = run_case(Case("x", "hold", {"object.size": [0.2, 0.06]}))
-    assert not stuck.kept
-    assert stuck.metrics == {}
-    assert stuck.note
+def test_a_value_that_the_hand_cannot_start_with_is_beyond_the_limit() -> None:
+    limit = Limit("k", "k", "", "", 25.0, 300.0, lambda v: {"object.size": [1e-3 * v, 0.06]}, lambda v: 0.1)
+    found = bisect(limit, 0, 1)
+    assert found.held is not None and found.held < 300.0
+    assert found.trials[1].reason == "the hand can't start with it"
+    assert "reach" in found.trials[1].end
 
 
 @pytest.mark.parametrize("geometric", [True, False])

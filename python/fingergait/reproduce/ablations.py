@@ -14,7 +14,7 @@ VARIANTS: dict[str, tuple[str, Mapping[str, Any]]] = {
     "slack gate": ("a finger is freed without asking", {"gait.slack_force": 1e3, "gait.slack_torque": 1e3}),
     "w2": ("the paper's 0.01", {"gait.w2": 0.01}),
     "surface motion": ("not followed", {"gait.follow_surface": False}),
-    "feedforward": ("none", {"robust.feedforward": False}),
+    "feedforward": ("none", {"robust.feedforward": 0.0}),
     "torque length": ("1 m, as the paper adds N and N m", {"force.torque_length": 1.0}),
     "friction": ("not adapted", {"force.adapt_friction": False}),
 }

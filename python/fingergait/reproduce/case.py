@@ -65,7 +65,7 @@ class Outcome:
     film
         The film strip as PNG, or None.
     note
-        Why there is no film strip, or no run at all.
+        Why there is no film strip.
     """
 
     case: Case
@@ -77,13 +77,13 @@ class Outcome:
 
     @property
     def kept(self) -> bool:
-        """Whether the run took place and the object was never lost."""
-        return bool(self.metrics) and not self.metrics["dropped"]
+        """Whether the object was never lost."""
+        return not self.metrics["dropped"]
 
     @property
     def turned(self) -> float:
         """Net rotation about the vertical, rad, without its sign."""
-        return abs(float(self.metrics["rotation_rad"])) if self.metrics else 0.0
+        return abs(float(self.metrics["rotation_rad"]))
 
     def value(self, key: str) -> float | None:
         """A metric of a run that kept the object; None otherwise."""

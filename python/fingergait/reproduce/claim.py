@@ -92,8 +92,7 @@ def worst(
         return -value if at_least else value
 
     chosen = max(outcomes, key=badness)
-    reason = chosen.metrics.get("lost_reason") if chosen.metrics else chosen.note
-    words = [word for word in (note, reason) if word]
+    words = [word for word in (note, chosen.metrics["lost_reason"]) if word]
     return Claim(
         name=name,
         claim=claim,
@@ -133,8 +132,6 @@ def share(
 
 
 def _what_happened(outcome: Outcome) -> str:
-    if not outcome.metrics:
-        return outcome.note
     if not outcome.kept:
         return str(outcome.metrics["lost_reason"])
     errors = f"{position(outcome):.2f} mm and {orientation(outcome):.3f} rad"

@@ -161,7 +161,7 @@ def grid(outcomes: Sequence[Outcome]) -> Figure:
     right.set_yticks(range(len(groups)), [""] * len(groups))
     left.axvline(360.0, color=GREY, ls="--", lw=0.9)
     for ax, label in ((left, "turned [degrees]"), (right, "largest orientation error of kept runs [rad]")):
-        ax.set_xlim(left=0.0)
+        ax.set_xlim(0.0, 1.06 * ax.get_xlim()[1])
         ax.set_ylim(len(groups) - 0.5, -0.5)
         ax.set_xlabel(label)
     left.set_xlim(right=max(420.0, left.get_xlim()[1]))

@@ -1,6 +1,7 @@
 """What each gait did to the grasp quality, measured from the contacts and not predicted by the gait LP."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ def completed_gaits(log: Log) -> list[Gait]:
     return gaits
 
 
-def gait_figures(log: Log, since: float) -> dict[str, float | int | None]:
+def gait_figures(log: Log, since: float) -> dict[str, Any]:
     """How the gaits that begin after `since`, s, served the quality.
 
     Returns
@@ -61,7 +62,8 @@ def gait_figures(log: Log, since: float) -> dict[str, float | int | None]:
     dict
         `gaits`: how many; `rate_positive`: share with a positive measured dQ/dt over the slide; `raised`: share with Q
         higher after than before; `resting`: share of time in which no finger is free; `above`: share of the resting
-        time with Q at or above its threshold.
+        time with Q at or above its threshold; `falling_at`, `lowered_at`: when the gaits began, s, whose rate isn't
+        positive, and that don't raise Q.
     """
     gaits = [gait for gait in completed_gaits(log) if log.t[gait.begin] >= since]
     counted = log.t >= since
@@ -73,6 +75,8 @@ def gait_figures(log: Log, since: float) -> dict[str, float | int | None]:
         "raised": float(np.mean([gait.after > gait.before for gait in gaits])) if gaits else None,
         "resting": float(rests.sum() / counted.sum()) if counted.any() else None,
         "above": float(above.mean()) if above.size else None,
+        "falling_at": [float(log.t[gait.begin]) for gait in gaits if gait.rate <= 0.0],
+        "lowered_at": [float(log.t[gait.begin]) for gait in gaits if gait.after <= gait.before],
     }
 
 

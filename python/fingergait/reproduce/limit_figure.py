@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import LogLocator, NullLocator, ScalarFormatter
 
 from fingergait.reproduce.limits import Bisection, Limit
 from fingergait.reproduce.style import BAD, GOOD, panels, styled
@@ -26,7 +26,7 @@ def limit_figure(limits: list[Limit], bisections: dict[str, list[Bisection]]) ->
             ax.set_xscale("log")
             ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             ax.xaxis.set_major_formatter(ScalarFormatter())
-            ax.xaxis.set_minor_formatter(NullFormatter())
+            ax.xaxis.set_minor_locator(NullLocator())
         ends = np.array([limit.easy, limit.hard])
         pad = (ends.max() / ends.min()) ** 0.04 if limit.geometric else 0.04 * float(np.ptp(ends))
         low, high = ends.min(), ends.max()

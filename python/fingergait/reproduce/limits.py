@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fingergait._core import FingergaitError
 from fingergait.reproduce.case import Case, Outcome, full_turn
 from fingergait.reproduce.constraint import explain
 from fingergait.reproduce.pool import run_case
@@ -115,7 +116,7 @@ def all_limits() -> list[Limit]:
             "",
             "1.4 (paper)",
             1.0,
-            4.0,
+            16.0,
             lambda v: {"truth.mass_scale": v},
             whole,
             geometric=True,
@@ -131,7 +132,7 @@ def all_limits() -> list[Limit]:
             whole,
             geometric=True,
         ),
-        Limit("radius", "radius", "mm", "25", 25.0, 45.0, lambda v: {"object.size": [round(1e-3 * v, 9), 0.06]}, whole),
+        Limit("radius", "radius", "mm", "25", 25.0, 60.0, lambda v: {"object.size": [round(1e-3 * v, 9), 0.06]}, whole),
         Limit(
             "friction",
             "true friction, 0.8 assumed at first",
@@ -171,7 +172,7 @@ def all_limits() -> list[Limit]:
             "ms",
             "0 (paper)",
             0.0,
-            60.0,
+            240.0,
             lambda v: {"sensors.pose_delay_s": round(1e-3 * v, 9)},
             whole,
         ),
@@ -214,12 +215,12 @@ def bisect_by_key(key: str, seed: int, halvings: int) -> Bisection:
 def _trial(limit: Limit, value: float, seed: int) -> Trial:
     overrides = {"duration": limit.duration(value), "seed": seed, **limit.keys(value)}
     case = Case(f"{limit.key} {value:g}, seed {seed}", _BASE, overrides)
-    outcome = run_case(case)
-    held = _held(outcome)
-    if held:
+    try:
+        outcome = run_case(case)
+    except FingergaitError as error:
+        return Trial(value, False, "the hand can't start with it", str(error), case.command)
+    if _held(outcome):
         return Trial(value, True, "", "", case.command)
-    if not outcome.metrics:
-        return Trial(value, False, "the run could not start", outcome.note, case.command)
     end = str(outcome.metrics["lost_reason"] or "kept, but turned too little")
     return Trial(value, False, explain(outcome.extra["constraints"]), end, case.command)
 

@@ -73,20 +73,16 @@ def write_page(result: Reproduction, path: Path) -> None:
 
 def _section(experiment: Experiment, result: Reproduction) -> Section:
     outcomes = {case.key: result.outcomes[case.key] for case in experiment.cases}
-    drawable = all(outcome.metrics for outcome in outcomes.values())
-    plots = experiment.draw(outcomes) if drawable else []
-    notes = [] if drawable else [outcome.note for outcome in outcomes.values() if not outcome.metrics]
-    notes += sorted({outcome.note for outcome in outcomes.values() if outcome.metrics and outcome.note})
     return Section(
         experiment=experiment,
         claims=result.claims[experiment.key],
-        pictures=[Picture(plot.caption, svg(plot.figure)) for plot in plots],
+        pictures=[Picture(plot.caption, svg(plot.figure)) for plot in experiment.draw(outcomes)],
         films=[
             Picture(f"{key[:1].upper()}{key[1:]}, from the front and from the top.", png(outcome.film))
             for key, outcome in outcomes.items()
             if outcome.film is not None
         ],
-        notes=notes,
+        notes=sorted({outcome.note for outcome in outcomes.values() if outcome.note}),
     )
 
 

@@ -12,7 +12,6 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from fingergait._core import FingergaitError
 from fingergait.log import Log
 from fingergait.report.film import film_strip
 from fingergait.reproduce.analysis import analyse, trace_of
@@ -24,11 +23,8 @@ Job = tuple[str, float, Callable[..., Any], tuple[Any, ...]]
 
 
 def run_case(case: Case) -> Outcome:
-    """Runs one case in this process. A scenario that can't start is an outcome without metrics."""
-    try:
-        run = simulate(case.scenario)
-    except FingergaitError as error:
-        return Outcome(case, {}, {}, note=str(error))
+    """Runs one case in this process."""
+    run = simulate(case.scenario)
     film, note = _film(run.log) if case.film else (None, "")
     trace = trace_of(run.log) if case.trace else {}
     return Outcome(case, run.metrics, analyse(run.log, case.scenario), trace, film, note)

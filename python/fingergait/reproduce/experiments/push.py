@@ -49,6 +49,14 @@ def _peak(outcome: Outcome) -> float | None:
     return None if not outcome.kept or None in peaks else 1e3 * float(max(peaks))
 
 
+def _each(outcome: Outcome) -> str:
+    """The recovery after each pulse."""
+    names = [f"{sign}{axis}" for axis in "xyz" for sign in "+-"]
+    times = ["never" if t is None else f"{t:.2f}" for t in outcome.metrics["recovery_time_s"]]
+    pairs = [f"{name} {time}" for name, time in zip(names * 2, times, strict=True)]
+    return f"forces: {', '.join(pairs[:6])} s; torques: {', '.join(pairs[6:])} s"
+
+
 def _judge(outcomes: Outcomes, hard: list[str]) -> list[Claim]:
     turning, rest = outcomes[_TURNING], outcomes[_REST]
     strong = [outcomes[key] for key in hard]
@@ -70,6 +78,7 @@ def _judge(outcomes: Outcomes, hard: list[str]) -> list[Claim]:
             0.5,
             "s",
             "0.5 s",
+            note=_each(turning),
         ),
         worst(
             "push-recovery-rest",
@@ -79,6 +88,7 @@ def _judge(outcomes: Outcomes, hard: list[str]) -> list[Claim]:
             0.5,
             "s",
             "0.5 s",
+            note=_each(rest),
         ),
         worst("push-peak", "Largest position error that a pulse causes", [turning, rest], _peak, 3.0, "mm"),
         share(

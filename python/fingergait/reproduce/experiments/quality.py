@@ -37,6 +37,16 @@ def _percent(name: str) -> Figure:
     return value
 
 
+def _exceptions(outcome: Outcome, name: str) -> str:
+    """When the gaits began that are not as claimed; a gait in the run's first seconds restores a stale grasp."""
+    figures = outcome.extra["gaits"]
+    times = [f"{t:.1f}" for t in figures[name]]
+    if not times:
+        return ""
+    shown = ", ".join(times[:6]) + (", ..." if len(times) > 6 else "")
+    return f"not so in {len(times)} of {figures['gaits']} gaits, begun at {shown} s"
+
+
 def _judge(outcomes: Outcomes) -> list[Claim]:
     run = [outcomes[_KEY]]
     return [
@@ -58,9 +68,17 @@ def _judge(outcomes: Outcomes) -> list[Claim]:
             100.0,
             "%",
             at_least=True,
+            note=_exceptions(run[0], "falling_at"),
         ),
         worst(
-            "quality-raised", "Gaits after which Q exceeds Q before", run, _percent("raised"), 95.0, "%", at_least=True
+            "quality-raised",
+            "Gaits after which Q exceeds Q before",
+            run,
+            _percent("raised"),
+            95.0,
+            "%",
+            at_least=True,
+            note=_exceptions(run[0], "lowered_at"),
         ),
         worst(
             "quality-above",
