@@ -1,6 +1,8 @@
 //! Force optimisation problems like those of a hand at work: sequences in which one instance follows from the last.
 #![allow(non_snake_case, dead_code)]
 
+pub mod oracle;
+
 use fg_core::friction::FrictionPyramid;
 use fg_core::manipulation::force::ForceProblem;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3, Vector6};
@@ -69,6 +71,67 @@ impl Instance {
             f_normal_max: &self.f_normal_max,
         }
     }
+}
+
+/// A problem with nothing of a hand about it but the sizes of its numbers: loose, tight, empty and coupled torque bounds,
+/// caps, pinned contacts, flat grasp maps. Returns the pyramids with it.
+pub fn arbitrary(random: &mut Random) -> (Vec<FrictionPyramid>, Instance) {
+    let n = 2 + random.below(4);
+    let m = 3 + random.below(10);
+    let n_q = [3 * n, 4 * n, 2 * n][random.below(3)];
+    let kind = random.below(6);
+    let coupled = random.below(4) == 0;
+    let pyramids = (0..n).map(|_| FrictionPyramid::inscribed(random.uniform(0.1, 1.5), m).unwrap()).collect();
+    let mut G = DMatrix::from_fn(6, 3 * n, |i, _| random.uniform(-1.0, 1.0) * if i < 3 { 1.0 } else { 0.05 });
+    if kind == 1 {
+        G.fill(0.0);
+    }
+    let mut J =
+        DMatrix::from_fn(
+            3 * n,
+            n_q,
+            |i, k| {
+                if coupled || i / 3 == k % n {
+                    random.uniform(-0.1, 0.1)
+                } else {
+                    0.0
+                }
+            },
+        );
+    let limit = [0.5, 0.05, 0.2][random.below(3)];
+    let mut tau_min = DVector::from_element(n_q, -limit);
+    let mut tau_max = DVector::from_element(n_q, limit);
+    match kind {
+        2 => {
+            // A joint without effect, and two that are one.
+            J.column_mut(0).fill(0.0);
+            let copy = J.column(1).clone_owned();
+            J.set_column(n_q - 1, &copy);
+        }
+        3 => {
+            for k in (0..n_q).filter(|k| k % 3 == 0) {
+                let centre = random.uniform(-0.3, 0.3);
+                (tau_min[k], tau_max[k]) = (centre - 0.1, centre + 0.1);
+            }
+        }
+        4 => (tau_min[0], tau_max[0]) = (0.02, 0.02),
+        5 => {
+            tau_min[random.below(n_q)] = f64::NEG_INFINITY;
+            tau_max[random.below(n_q)] = f64::INFINITY;
+        }
+        _ => {}
+    }
+    let scale = [1.0, 10.0, 50.0][random.below(3)];
+    let F_des = Vector6::from_fn(|i, _| random.uniform(-1.0, 1.0) * scale * if i < 3 { 1.0 } else { 0.05 });
+    let f_prev = DVector::from_fn(3 * n, |_, _| random.uniform(-3.0, 5.0));
+    let f_normal_max = (0..n)
+        .map(|_| match random.below(6) {
+            0 => 0.0,
+            1 => random.uniform(0.0, 5.0),
+            _ => f64::INFINITY,
+        })
+        .collect();
+    (pyramids, Instance { G, J, F_des, f_prev, tau_min, tau_max, f_normal_max })
 }
 
 /// A cylinder held by spherical tips of three-joint fingers with links of 52 and 45 mm.
