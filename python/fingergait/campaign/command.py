@@ -1,6 +1,7 @@
 """The work of `fingergait campaign`: sample, run, keep, judge, report."""
 
 import json
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -90,8 +91,12 @@ def _run(
         store.add(rows, [{"index": outcome.index, **outcome.timing} for outcome in outcomes])
         progress.add([row["status"] for row in rows])
 
-    with connect(options.scheduler, options.workers) as client, progress:
-        run_all(client, trials(), keep)
+    try:
+        with connect(options.scheduler, options.workers) as client, progress:
+            run_all(client, trials(), keep)
+    except KeyboardInterrupt:
+        print(f"fingergait: stopped; --resume --out {store.folder} goes on", file=sys.stderr)
+        raise
 
 
 def _row(spec: CampaignSpec, numeric: dict[str, bool], sample: Sample, outcome: Outcome) -> dict[str, Any]:
