@@ -203,7 +203,7 @@ impl Default for ForceConfig {
             friction: 0.65,
             edges: 8,
             tau_max: 0.5,
-            f_n_max: 15.0,
+            f_n_max: 25.0,
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
             tolerance: 1e-7,
@@ -221,8 +221,9 @@ impl Default for ForceConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobustConfig {
-    /// Feed the wrench that the force optimiser could deliver back into K.
-    pub anti_windup: bool,
+    /// Share of the artefact's anti-windup gain with which the wrench that the force optimiser could not deliver is fed back
+    /// into K; zero: none. The full gain lets go of the object while a hard push lasts, none loses a slippery one.
+    pub anti_windup: f64,
     /// Use the artefact's reference prefilter.
     pub prefilter: bool,
     /// Share of the joints' nominal damping that is overcome along the desired motion; zero: none. Deviation: not in the
@@ -232,7 +233,7 @@ pub struct RobustConfig {
 
 impl Default for RobustConfig {
     fn default() -> Self {
-        Self { anti_windup: true, prefilter: true, feedforward: 1.0 }
+        Self { anti_windup: 0.1, prefilter: true, feedforward: 1.0 }
     }
 }
 
@@ -309,6 +310,7 @@ impl Config {
             ("force.slip_hold", f.slip_hold, 0.0, 1e3),
             ("force.friction_recovery", f.friction_recovery, 1e-3, 1e9),
             ("force.friction_floor", f.friction_floor, 0.01, 10.0),
+            ("robust.anti_windup", self.robust.anti_windup, 0.0, 1.0),
             ("robust.feedforward", self.robust.feedforward, 0.0, 10.0),
             ("torque.K_p", t.K_p, 0.0, 1e3),
             ("torque.K_i", t.K_i, 0.0, 1e5),

@@ -197,8 +197,7 @@ impl RobustController {
 
     /// Advances K, told by how much (`psi` = F_des - G f) the force optimiser fell short.
     pub fn advance(&mut self, psi: &Vector6<f64>) {
-        let deficit =
-            if self.config.anti_windup { -psi.component_div(&self.beta()) } else { Vector6::zeros() };
+        let deficit = -psi.component_div(&self.beta()) * self.config.anti_windup;
         self.K.advance(&self.e, &deficit);
     }
 
