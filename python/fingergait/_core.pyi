@@ -46,6 +46,8 @@ class Controller:
     @property
     def kind(self) -> str: ...
     @property
+    def description(self) -> str: ...
+    @property
     def sample_time(self) -> float: ...
     @property
     def mass(self) -> float: ...
@@ -89,6 +91,12 @@ class Diagnostics:
 
     @property
     def mode(self) -> str: ...
+    @property
+    def phase(self) -> str:
+        """Phase of the gait: "hold", "unload", "slide", "press" or "load"."""
+    @property
+    def quality(self) -> float:
+        """Grasp quality Q, eq. (1)."""
     @property
     def free_finger(self) -> int | None: ...
     @property
