@@ -27,11 +27,11 @@ class Block:
 
     @property
     def r(self) -> int:
-        return self.rows.stop - self.rows.start
+        return int(self.rows.stop - self.rows.start)
 
     @property
     def c(self) -> int:
-        return self.cols.stop - self.cols.start
+        return int(self.cols.stop - self.cols.start)
 
 
 def parse_blocks(blocks: Sequence[tuple[int, int]]) -> list[Block]:

@@ -60,14 +60,13 @@ def fit_magnitude(
     weights = np.ones_like(target) if weight is None else np.asarray(weight, dtype=float)
     weights = weights / np.sqrt(np.mean(weights**2))
     low, high = np.log(band if band is not None else (omega[0], omega[-1]))
-    best: MagnitudeFit | None = None
-    for order in range(max_order + 1):
-        fit, rms = _fit(omega, target, weights, order, low, high)
-        if best is None or rms < 0.9 * best_rms:
-            best, best_rms = fit, rms
+    best, best_rms = _fit(omega, target, weights, 0, low, high)
+    for order in range(1, max_order + 1):
         if best_rms < tolerance:
             break
-    assert best is not None
+        fit, rms = _fit(omega, target, weights, order, low, high)
+        if rms < 0.9 * best_rms:
+            best, best_rms = fit, rms
     return best
 
 
@@ -87,13 +86,20 @@ def _fit(
         values = shape(corners)
         return np.asarray(weights * (values + np.average(target - values, weights=weights**2) - target))
 
+    def jacobian(corners: Array) -> Array:
+        squares = np.exp(2.0 * corners)
+        slopes = squares / (w2 + squares)  # of log|s + c| with respect to log c, (n_w, 2 order)
+        slopes[:, order:] *= -1.0
+        mean = np.average(slopes, axis=0, weights=weights**2)
+        return np.asarray(weights[:, None] * (slopes - mean))
+
     if order == 0:
         corners = np.zeros(0)
     else:
         # two starts: corners spread over the band with zeros first, and with poles first
         spread = np.linspace(low, high, 2 * order + 2)[1:-1]
         starts = [np.concatenate([spread[0::2], spread[1::2]]), np.concatenate([spread[1::2], spread[0::2]])]
-        answers = [least_squares(residual, s, bounds=(low, high), xtol=1e-10, ftol=1e-10) for s in starts]
+        answers = [least_squares(residual, s, jacobian, bounds=(low, high), xtol=1e-9, ftol=1e-9) for s in starts]
         corners = min(answers, key=lambda a: float(a.cost)).x
     error = shape(corners) + offset(corners) - target
     fit = MagnitudeFit(

@@ -6,7 +6,7 @@ import numpy as np
 import slycot
 
 from .errors import LibraryError
-from .statespace import StateSpace, balanced_scaling, lft_lower
+from .statespace import StateSpace, balanced_scaling, lft_lower, system
 
 _START = 100.0  # first gamma tried: SB10AD's bisection is quick from here and stalls from 1e100
 
@@ -36,7 +36,7 @@ def h_infinity(
         answer = slycot.sb10ad(*arguments, gamma, *matrices, job=4)
     except Exception as error:
         raise LibraryError(f"SB10AD found no controller at gamma = {gamma:.4g}: {_line(error)}") from error
-    K = StateSpace(*(np.asarray(m) for m in answer[1:5]))
+    K = system(*answer[1:5])
     closed = lft_lower(P, K)
     if not all(np.all(np.isfinite(m)) for m in (K.A, K.B, K.C, K.D)) or not closed.is_stable():
         raise LibraryError(

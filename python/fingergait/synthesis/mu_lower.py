@@ -121,8 +121,9 @@ def _mixed(M: ComplexArray, blocks: Sequence[Block]) -> float:
 
     def proven(k: Array, MV: ComplexArray) -> NDArray[np.bool_]:
         """Which of the pairs (k, direction) make the loop singular within norm k."""
-        closed = np.linalg.solve(np.eye(len(M)) - k[:, None, None] * MV, np.broadcast_to(M, (len(k), *M.shape)))
-        return np.asarray(k * _complex(closed[:, cols][:, :, rows], inner, 20) >= 1.0)
+        loop = np.eye(len(M)) - k[:, None, None] * MV
+        closed = np.linalg.solve(loop, np.broadcast_to(M, (len(k), *M.shape)))[:, cols][:, :, rows]
+        return np.asarray(np.multiply(k, _complex(np.asarray(closed, dtype=complex), inner, 20)) >= 1.0)
 
     ceiling = 1.0 / best if best > 0.0 else 100.0 / peak
     ks = np.geomspace(1.0 / peak, ceiling, 10)

@@ -106,7 +106,7 @@ def _largest(A: ComplexArray, D: ComplexArray) -> Array:
     L = np.linalg.cholesky(D)
     half = np.linalg.solve(L, A)
     whole = np.linalg.solve(L, np.conj(np.swapaxes(half, -1, -2)))
-    return np.asarray(np.linalg.eigvalsh(_hermitian_part(whole))[:, -1])
+    return np.asarray(np.linalg.eigvalsh(_hermitian_part(np.asarray(whole, dtype=complex)))[:, -1])
 
 
 def upper_bound(
@@ -192,7 +192,7 @@ def _centre(x: Array, t: Array, Fk: ComplexArray, Ew: ComplexArray, cost: Array,
         SiSk = np.linalg.solve(S[:, None], Sk[todo])
         DiEk = np.linalg.solve(D[:, None], np.broadcast_to(Ew, (todo.size, *Ew.shape)))
         gradient = cost - np.trace(SiSk, axis1=2, axis2=3).real - np.trace(DiEk, axis1=2, axis2=3).real
-        hessian = _gram(SiSk) + _gram(DiEk)
+        hessian = _gram(np.asarray(SiSk)) + _gram(np.asarray(DiEk))
         ridge = 1e-13 * np.trace(hessian, axis1=1, axis2=2)
         step = -np.linalg.solve(hessian + ridge[:, None, None] * np.eye(x.shape[1]), gradient[..., None])[..., 0]
         decrement = np.sqrt(np.maximum(-np.einsum("wk,wk->w", gradient, step), 0.0))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .statespace import StateSpace
+from .discretise import DiscreteController, discretise
+from .statespace import StateSpace, system
 
 
 def pid(bandwidth: float, derivative_filter: float) -> StateSpace:
@@ -18,4 +19,11 @@ def pid(bandwidth: float, derivative_filter: float) -> StateSpace:
     w, T = bandwidth, derivative_filter
     kp, kd, ki = 1.5 * w**2, 2.25 * w, 0.25 * w**3
     # kd s/(T s + 1) = kd/T - (kd/T) x_f,  T x_f' = e - x_f
-    return StateSpace([[0.0, 0.0], [0.0, -1.0 / T]], [[1.0], [1.0 / T]], [[ki, -kd / T]], [[kp + kd / T]])
+    return system([[0.0, 0.0], [0.0, -1.0 / T]], [[1.0], [1.0 / T]], [[ki, -kd / T]], [[kp + kd / T]])
+
+
+def pid_controller(
+    bandwidth: float, derivative_filter: float, dt: float, windup_decay: float = 10.0
+) -> DiscreteController:
+    """The PID of one axis at sample time dt (s), with its anti-windup gain."""
+    return discretise(pid(bandwidth, derivative_filter), dt, windup_decay=windup_decay)

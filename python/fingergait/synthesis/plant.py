@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .blocks import Blocks
 from .interconnect import interconnect
-from .statespace import ComplexArray, StateSpace, append, gain
+from .statespace import ComplexArray, StateSpace, append, gain, system
 from .uncertainty import UncertainBody
 from .weights import Weight
 
@@ -35,17 +35,17 @@ class Actuation:
 
     def rational(self) -> StateSpace:
         """The lag and a first-order Pade approximation of the dead time."""
-        system = self.lag_only()
+        path = self.lag_only()
         if self.dead_time > 0.0:
             corner = 2.0 / self.dead_time
-            system = system @ StateSpace(*(np.array([[v]]) for v in (-corner, 1.0, 2.0 * corner, -1.0)))
-        return system
+            path = path @ system(-corner, 1.0, 2.0 * corner, -1.0)
+        return path
 
     def lag_only(self) -> StateSpace:
         """1 / (lag s + 1)."""
         if self.lag <= 0.0:
             return gain(1.0)
-        return StateSpace(*(np.array([[v]]) for v in (-1.0 / self.lag, 1.0 / self.lag, 1.0, 0.0)))
+        return system(-1.0 / self.lag, 1.0 / self.lag, 1.0, 0.0)
 
     def dead_time_at(self, omega: ArrayLike) -> ComplexArray:
         """exp(-j omega dead_time), exactly."""
@@ -67,10 +67,10 @@ class GeneralizedPlant:
     weights: Sequence[AxisWeights]
     actuation: Actuation = Actuation()
 
-    def blocks(self, *, shared: bool = True) -> Blocks:
+    def blocks(self) -> Blocks:
         """Structure for the mu of the closed loop: Delta's blocks and one full performance block, 3q x 2q."""
         q = self.body.q
-        return [*self.body.blocks(shared=shared), (3 * q, 2 * q)]
+        return [*self.body.blocks(), (3 * q, 2 * q)]
 
     def statespace(self, *, dead_time: bool = True) -> StateSpace:
         """The generalised plant P. The dead time enters as a Pade approximation, or not at all."""

@@ -90,7 +90,8 @@ class StateSpace:
 
     def transformed(self, T: Array) -> StateSpace:
         """The same system in the coordinates xi = T^-1 x."""
-        return StateSpace(np.linalg.solve(T, self.A @ T), np.linalg.solve(T, self.B), self.C @ T, self.D, self.dt)
+        inverse = np.linalg.inv(T)
+        return system(inverse @ self.A @ T, inverse @ self.B, self.C @ T, self.D, self.dt)
 
     def __matmul__(self, first: StateSpace) -> StateSpace:
         """self @ first: `first` acts on the input, self on its output."""
@@ -99,6 +100,12 @@ class StateSpace:
         A = np.block([[self.A, self.B @ first.C], [np.zeros((first.order, self.order)), first.A]])
         B = np.vstack([self.B @ first.D, first.B])
         return StateSpace(A, B, np.hstack([self.C, self.D @ first.C]), self.D @ first.D, self.dt)
+
+
+def system(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike, dt: float | None = None) -> StateSpace:
+    """A StateSpace from anything that numpy reads as matrices."""
+    A, B, C, D = (np.atleast_2d(np.asarray(M, dtype=float)) for M in (A, B, C, D))
+    return StateSpace(A, B, C, D, dt)
 
 
 def gain(D: ArrayLike, dt: float | None = None) -> StateSpace:
@@ -113,8 +120,8 @@ def append(*systems: StateSpace) -> StateSpace:
     dts = {g.dt for g in systems}
     if len(dts) != 1:
         raise ValueError(f"append: systems must share one sample time, found {dts}")
-    blocks = [linalg.block_diag(*(getattr(g, name) for g in systems)) for name in "ABCD"]
-    return StateSpace(*blocks, dts.pop())
+    A, B, C, D = (linalg.block_diag(*(getattr(g, name) for g in systems)) for name in "ABCD")
+    return StateSpace(A, B, C, D, dts.pop())
 
 
 def first_order_chain(zeros: Sequence[float], poles: Sequence[float], high_gain: float) -> StateSpace:
@@ -129,12 +136,12 @@ def first_order_chain(zeros: Sequence[float], poles: Sequence[float], high_gain:
     """
     if len(zeros) != len(poles):
         raise ValueError(f"chain: as many zeros as poles, found {len(zeros)} and {len(poles)}")
-    system = gain(high_gain)
+    chain = gain(high_gain)
     for z, p in zip(zeros, poles, strict=True):
         root = np.sqrt(abs(z - p)) or 1.0
         section = StateSpace(np.array([[-p]]), np.array([[root]]), np.array([[(z - p) / root]]), np.array([[1.0]]))
-        system = section @ system
-    return system
+        chain = section @ chain
+    return chain
 
 
 def lft_lower(P: StateSpace, K: StateSpace) -> StateSpace:
@@ -190,9 +197,9 @@ def balanced_scaling(G: StateSpace, sweeps: int = 50) -> StateSpace:
     return StateSpace(A, B, C, G.D, G.dt)
 
 
-def as_statespace(system: Any) -> StateSpace:
+def as_statespace(given: Any) -> StateSpace:
     """Any object with A, B, C, D (python-control's, scipy's, ours) as a StateSpace."""
-    if isinstance(system, StateSpace):
-        return system
-    dt = getattr(system, "dt", None)
-    return StateSpace(system.A, system.B, system.C, system.D, float(dt) if dt else None)
+    if isinstance(given, StateSpace):
+        return given
+    dt = getattr(given, "dt", None)
+    return system(given.A, given.B, given.C, given.D, float(dt) if dt else None)

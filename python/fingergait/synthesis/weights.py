@@ -1,4 +1,4 @@
-"""Weighting functions in the form of the paper's Table I: DC gain, crossover, high-frequency gain, order, axis scale."""
+"""Weighting functions as in the paper's Table I: DC gain, crossover, high-frequency gain, order, axis scale."""
 
 from __future__ import annotations
 
