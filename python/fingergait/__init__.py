@@ -1,6 +1,7 @@
 """Model-based finger gaits for multi-fingered hands: robust in-hand rotation of unknown objects, with a certificate."""
 
 from fingergait import gl as gl  # before anything that imports MuJoCo
+from fingergait import synthesis
 from fingergait._core import (
     ArtifactError,
     Command,
@@ -53,4 +54,5 @@ __all__ = [
     "gait_lp",
     "hand_json",
     "simulate",
+    "synthesis",
 ]

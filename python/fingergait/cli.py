@@ -113,6 +113,24 @@ def reproduce(
     raise typer.Exit(DONE if summary["held"] == len(summary["claims"]) else MISSED)
 
 
+@app.command("synthesize")
+def synthesize(
+    spec: Annotated[
+        str, typer.Argument(metavar="SPEC.toml", help="A packaged spec's name, or a TOML file.")
+    ] = "contact",
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where the artefact goes; the report beside it.")] = Path(
+        "runs/controller.json"
+    ),
+    as_json: Json = False,
+) -> None:
+    """Synthesise a robust controller; write its artefact and a one-page report with its certificate."""
+    from fingergait.paths import find
+    from fingergait.synthesis.command import run_synthesize
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json)
+
+
 @app.command()
 def check(
     file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],

@@ -90,7 +90,7 @@ class GraspConfig(Table):
 class ControllerConfig(Table):
     """Artefact (file or packaged name), control rate, Hz, and the friction that the force optimiser assumes."""
 
-    file: str = "pid"
+    file: str = "mu"
     rate_hz: Positive = 500.0
     friction: Positive = 0.65
 

@@ -1,7 +1,9 @@
 """Errors that the synthesis raises on purpose."""
 
+from fingergait._core import FingergaitError
 
-class SynthesisError(Exception):
+
+class SynthesisError(FingergaitError):
     """The synthesis cannot deliver what was asked for: says which step stopped and what was found."""
 
 
