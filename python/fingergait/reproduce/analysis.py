@@ -28,8 +28,8 @@ def analyse(log: Log, scenario: Scenario) -> dict[str, Any]:
     dict
         `overshoot`: largest overshoot of a stepped channel, fraction of its step; `gravity_recovery_s`: time from
         lift-off until the vertical error stays under 0.5 mm; `pulses`: for each disturbance the peak errors (m, rad)
-        and whether a finger was free in it; `height_drift_m`: change of the mean contact height between the first and
-        the last third of the run; `gaits`: see `gaits.gait_figures`; `constraints`: see `active_constraints`.
+        and whether a finger was free in it; `height_drift_m`: change of the mean contact height between the middle
+        and the last third of the run; `gaits`: see `gaits.gait_figures`; `constraints`: see `active_constraints`.
     """
     errors = pose_errors(log.pose("object"), log.pose("desired"))
     return {
@@ -91,4 +91,4 @@ def _height_drift(log: Log, since: float) -> float | None:
     counted = log.t >= since
     heights = log.block("height")[counted].mean(axis=1)
     third = len(heights) // 3
-    return float(heights[-third:].mean() - heights[:third].mean()) if third else None
+    return float(heights[-third:].mean() - heights[third : 2 * third].mean()) if third else None

@@ -135,7 +135,7 @@ def all_limits() -> list[Limit]:
         Limit("radius", "radius", "mm", "25", 25.0, 60.0, lambda v: {"object.size": [round(1e-3 * v, 9), 0.06]}, whole),
         Limit(
             "friction",
-            "true friction, 0.8 assumed at first",
+            "true friction, unknown to the controller",
             "",
             "not given (video)",
             1.0,

@@ -1,4 +1,4 @@
-"""Objects more slippery than the controller assumes at first."""
+"""Objects whose friction the controller does not know."""
 
 from fingergait.reproduce import figures
 from fingergait.reproduce.case import Case, Outcome
@@ -44,12 +44,14 @@ def slippery(quick: bool) -> Experiment:
         for mass in _MASSES
         for seed in seeds
     ]
+    assumed = cases[0].scenario.controller.friction
     return Experiment(
         key="slippery",
         title="Friction that nobody told the controller",
         paper="Section V-C.2, last paragraph (video only)",
-        text="The controller assumes a friction of 0.8 and the object has less. It must notice the slip from joint "
-        "angles, contact places and the object's pose, and press harder. Every run has noise on all sensors.",
+        text=f"The controller assumes a friction of {assumed:g} at first and doesn't know the object's. It must notice "
+        "the slip from joint angles, contact places and the object's pose, and press harder. Every run has noise "
+        "on all sensors.",
         cases=tuple(cases),
         judge=lambda outcomes: _judge(outcomes, seeds),
         draw=lambda outcomes: _draw(outcomes),
