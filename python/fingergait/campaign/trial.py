@@ -12,6 +12,7 @@ from fingergait import _core
 from fingergait.campaign.build import build_id
 from fingergait.hand import compile_spec, find_fingers, load_spec
 from fingergait.log import Log
+from fingergait.model import true_inertia
 from fingergait.paths import find
 from fingergait.scenario import Scenario
 from fingergait.simulate import simulate
@@ -37,6 +38,10 @@ METRICS: dict[str, type] = {
 """Figures of `run` that become columns."""
 
 OBSERVED: dict[str, type] = {
+    "true_mass_kg": float,
+    "true_inertia_x": float,
+    "true_inertia_y": float,
+    "true_inertia_z": float,
     "gaiting_at_end": bool,
     "gaiting_at_fault": bool,
     "worst_safe_mode": int,
@@ -45,9 +50,10 @@ OBSERVED: dict[str, type] = {
     "max_torque_share": float,
     "max_torque_rate_share": float,
 }
-"""Figures that a campaign adds from the log: whether a finger was free at the end and as the fault began; the most
-severe mode of the core's guard, and when after the fault's beginning it first saw one; commands that were not finite or
-outside their limits; largest command and largest change of it in one step as shares of their limits."""
+"""Figures that a campaign adds: true mass and principal moments, kg m^2; from the log, whether a finger was free at the
+end and as the fault began; the most severe mode of the core's guard, and when after the fault's beginning it first saw
+one; commands that were not finite or outside their limits; largest command and largest change of it in one step as
+shares of their limits."""
 
 _ROUNDING = 1e-5  # relative: a log holds single precision
 
@@ -118,6 +124,8 @@ def observed(log: Log, scenario: Scenario) -> dict[str, Any]:
     seen = log["faults"][begun:] != 0.0 if begun is not None and "faults" in log.names else np.zeros(0)
     first = int(np.argmax(seen)) if seen.any() else None
     return {
+        "true_mass_kg": scenario.object.mass * scenario.truth.mass_scale,
+        **{f"true_inertia_{axis}": float(x) for axis, x in zip("xyz", true_inertia(scenario), strict=True)},
         "gaiting_at_end": bool(free[-1] >= 0.0),
         "gaiting_at_fault": None if begun is None or begun >= len(free) else bool(free[begun] >= 0.0),
         "worst_safe_mode": None if modes is None else int(modes.max()),

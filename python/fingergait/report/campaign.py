@@ -9,7 +9,6 @@ import jinja2
 import numpy as np
 import pyarrow as pa
 
-from fingergait._core import ConfigError
 from fingergait.campaign.sensitivity import influences
 from fingergait.campaign.spec import CampaignSpec
 from fingergait.campaign.statistics import (
@@ -21,7 +20,7 @@ from fingergait.campaign.statistics import (
 )
 from fingergait.campaign.store import write_atomic
 from fingergait.paths import find
-from fingergait.report.campaign_plots import box_figure, error_figure, image, influence_figure, trend_figure
+from fingergait.report.campaign_plots import Nominal, box_figure, error_figure, image, influence_figure, trend_figure
 
 _SHOWN = 12  # failures listed for each cause
 
@@ -51,10 +50,10 @@ def write_campaign_page(
     )
     environment.filters["milli"] = lambda value: "-" if value is None else f"{1e3 * value:.2f}"
     found = influences(rows)
-    certified, words = certified_box(spec)
+    nominal, words = design(spec)
     plots = {
         "errors": error_figure(rows, (spec.limits.position_error_p99, spec.limits.orientation_error_p99)),
-        "box": box_figure(rows, certified),
+        "box": box_figure(rows, nominal),
         "influence": influence_figure(found),
         "trend": trend_figure(rows, found),
     }
@@ -83,27 +82,23 @@ def failures(rows: pa.Table) -> list[tuple[str, list[dict[str, Any]]]]:
     return sorted(groups.items(), key=lambda item: (-len(item[1]), item[0]))
 
 
-def certified_box(spec: CampaignSpec) -> tuple[dict[str, Any] | None, str]:
-    """The uncertainty that the controller's artefact is certified for, as fractions, and the certificate in words."""
+def design(spec: CampaignSpec) -> tuple[Nominal, str]:
+    """What the controller was designed and is certified for, from its artefact, and the certificate in words."""
     name = spec.base().controller.file
+    path = find(name, "controllers", ".json", "controller.file")
+    artefact = json.loads(path.read_text(encoding="utf-8"))
+    mass, inertia = float(artefact["nominal"]["mass"]), tuple(map(float, artefact["nominal"]["inertia"]))
     try:
-        artefact = json.loads(find(name, "controllers", ".json", "controller.file").read_text(encoding="utf-8"))
-        provenance = artefact["provenance"]
-        uncertainty = provenance.get("uncertainty") or provenance["spec"]["uncertainty"]
-        inertia = uncertainty["inertia"]
-        box: dict[str, Any] = {
-            "mass": float(uncertainty["mass"]),
-            "inertia": [float(x) for x in inertia] if isinstance(inertia, list) else [float(inertia)] * 3,
-        }
-    except (ConfigError, OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None, f"The controller {name} states no certified uncertainty."
-    peak = provenance.get("figures", {}).get("mu_peak")
-    bound = f", mu at most {peak:.3f}" if isinstance(peak, float) else ""
-    each = " and ".join(sorted({f"{100 * x:g} %" for x in box["inertia"]}))
-    return box, (
-        f"The controller {name} is certified for a mass off by {100 * box['mass']:g} % and moments of inertia off by "
-        f"{each}{bound}: the green frame. The certificate is of a linear model with contacts that hold; the dots are "
-        "simulated runs with everything else drawn at once."
+        uncertainty = artefact["provenance"]["spec"]["uncertainty"]
+        certified = float(uncertainty["mass"]), tuple(map(float, uncertainty["inertia"]))
+        peak = float(artefact["provenance"]["figures"]["mu_peak"])
+    except (KeyError, TypeError, ValueError):
+        return Nominal(mass, inertia, None), f"The controller {path.stem} states no certified uncertainty."
+    each = " and ".join(sorted({f"{100 * x:g} %" for x in certified[1]}))
+    return Nominal(mass, inertia, certified), (
+        f"The controller {path.stem} is certified for a mass off by {100 * certified[0]:g} % and moments of inertia "
+        f"off by {each}, mu at most {peak:.3f}: the green frame. The certificate is of a linear model with contacts "
+        "that hold; the dots are simulated runs with everything else drawn at once."
     )
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import io
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -22,6 +23,18 @@ _HELD, _LOST, _PAPER, _BOX = "#3b6ea5", "#c0392b", "#555555", "#2e8b57"
 _PALE = "#b8c4d0"
 _RASTER = 2000  # points above which a scatter is drawn as pixels
 _BINS = 8
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What a controller was designed for: mass, kg, and moments (3,), kg m^2.
+
+    `certified`: the errors of mass and moments that its certificate covers, as fractions; None without one.
+    """
+
+    mass: float
+    inertia: tuple[float, ...]
+    certified: tuple[float, tuple[float, ...]] | None
 
 
 def image(figure: Figure) -> str:
@@ -60,40 +73,39 @@ def error_figure(rows: pa.Table, limits: tuple[float | None, float | None]) -> F
     return figure
 
 
-def box_figure(rows: pa.Table, certified: dict[str, Any] | None) -> Figure | None:
-    """Outcomes over the true mass and moments of inertia, relative to what the controller believes.
+def box_figure(rows: pa.Table, nominal: Nominal) -> Figure | None:
+    """Outcomes over the true mass and moments of inertia, relative to what the controller was designed for.
 
-    `certified` is the uncertainty of the artefact: `mass`, and `inertia` of each axis, as fractions. None where a
-    campaign draws no mass or no inertia.
+    None where neither varies.
     """
-    mass = "x.truth.mass_scale"
-    whole = "x.truth.inertia_scale"
-    each = [f"{whole}[{i}]" for i in range(3)]
-    names = [name for name in (each if each[0] in rows.schema.names else [whole]) if name in rows.schema.names]
-    if mass not in rows.schema.names or not names:
-        return None
-    figure = Figure(figsize=(3.5 * len(names) + 1.0, 3.7), layout="constrained")
     status = _status(rows)
     held, lost = status == "held", status == "dropped"
-    m = 100.0 * (column(rows, mass) - 1.0)
+    m = 100.0 * (column(rows, "true_mass_kg") / nominal.mass - 1.0)
+    moments = [
+        100.0 * (column(rows, f"true_inertia_{axis}") / value - 1.0)
+        for axis, value in zip("xyz", nominal.inertia, strict=True)
+    ]
+    ran = held | lost
+    if not ran.any() or max(np.ptp(m[ran]), *(np.ptp(inertia[ran]) for inertia in moments)) == 0.0:
+        return None
+    figure = Figure(figsize=(11.0, 3.7), layout="constrained")
     errors = 1e3 * column(rows, "max_position_error_m")
-    grid = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    for index, (axes, name) in enumerate(zip(grid, names, strict=True)):
-        inertia = 100.0 * (column(rows, name) - 1.0)
+    grid = figure.subplots(1, 3, sharey=True)
+    for index, (axes, inertia) in enumerate(zip(grid, moments, strict=True)):
         points = axes.scatter(
             m[held], inertia[held], c=errors[held], s=14, cmap="viridis", lw=0.0, rasterized=held.sum() > _RASTER
         )
         if lost.any():
             axes.scatter(m[lost], inertia[lost], marker="x", s=32, color=_LOST, lw=1.5, label="dropped", zorder=3)
-        if certified is not None:
-            wide, tall = 100.0 * certified["mass"], 100.0 * certified["inertia"][min(index, 2)]
+        if nominal.certified is not None:
+            wide, tall = 100.0 * nominal.certified[0], 100.0 * nominal.certified[1][index]
             box = Rectangle((-wide, -tall), 2 * wide, 2 * tall, fill=False, ec=_BOX, lw=1.8, label="certified")
             axes.add_patch(box)
         axes.autoscale_view()
         axes.margins(0.08)
-        axes.set_xlabel("true mass against nominal [%]")
-        axes.set_title(f"inertia {'xyz'[index]}" if len(names) == 3 else "inertia", fontsize=10)
-    grid[0].set_ylabel("true moment against nominal [%]")
+        axes.set_xlabel("true mass against design [%]")
+        axes.set_title(f"inertia {'xyz'[index]}", fontsize=10)
+    grid[0].set_ylabel("true moment against design [%]")
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=2, fontsize=8, frameon=False)
     if held.any():
