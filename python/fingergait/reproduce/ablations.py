@@ -11,6 +11,7 @@ VARIANTS: dict[str, tuple[str, Mapping[str, Any]]] = {
     "plane of Q_o": ("the paper's, through the contacts", {"gait.plane": "contacts"}),
     "rate box": ("the paper's, round the last velocity", {"gait.project_rate_box": False}),
     "height term": ("none", {"gait.w_z": 0.0}),
+    "plane and height": ("the paper's plane, no height term", {"gait.plane": "contacts", "gait.w_z": 0.0}),
     "slack gate": ("a finger is freed without asking", {"gait.slack_force": 1e3, "gait.slack_torque": 1e3}),
     "w2": ("the paper's 0.01", {"gait.w2": 0.01}),
     "surface motion": ("not followed", {"gait.follow_surface": False}),
