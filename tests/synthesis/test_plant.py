@@ -78,7 +78,7 @@ def test_damping_modes_make_up_the_damping_and_cover_a_common_factor():
     np.testing.assert_allclose(damping_modes(np.diag([4.0, 9.0])), np.diag([2.0, 3.0]))
 
 
-def test_reflected_hand_of_the_feasibility_study():
+def test_reflected_hand_with_contacts_below_the_centre():
     """Contacts 3.7 mm below Oo: 106, 71 N s/m, .0172, .0532 N m s, coupling .46 N s, .263, .095 kg."""
     G, J, M = grasp(0.0563, 0.060)
     hand = reflect(G, J, np.full(12, 0.05), M)

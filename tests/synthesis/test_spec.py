@@ -99,7 +99,7 @@ def test_the_literal_table_explains_its_infeasibility():
 
 
 def test_the_floor_under_one_is_not_enough():
-    """With s_r = 1 the x axis has a floor of 0.9 only, but D-K ends at 1.10, as the feasibility study measured."""
+    """With s_r = 1 the x axis has a floor of 0.9 only, but D-K ends at 1.10, as an earlier study measured."""
     data = edited(LITERAL, sizes={"noise": 1e-3, "reference": [1, 1, 0.1, 0.1, 0.1, 0.1]}, iteration={"iterations": 3})
     data["reasons"] = {"sizes.noise": "mm and mrad", "sizes.reference": "a test"}
     with pytest.raises(InfeasibleSpecError, match=r"x y: the D-K iteration ended at mu = 1\.1.*sizes\.error"):

@@ -167,7 +167,7 @@ def test_the_command_writes_both_files_and_clean_json(tmp_path, capsys):
     assert figures["mu_peak"] < 1.0 and len(figures["mu_peak_per_axis"]) == 6
     assert "gamma" in printed.err and "mu peak" in printed.err
     assert Path(figures["artefact"]) == out and out.exists() and out.with_suffix(".html").exists()
-    # the feasibility study: .43, .53, .53, .61 without any dead time, here with half a sample
+    # an earlier study: .43, .53, .53, .61 without any dead time, here with half a sample
     peaks = [float(line.split()[-2]) for line in printed.err.splitlines() if line.startswith(("x y", "rz"))]
     assert min(peaks) == pytest.approx(0.44, abs=0.03)
 
