@@ -143,8 +143,8 @@ impl Default for GaitConfig {
             min_slide_time: 0.1,
             max_slide_time: 1.5,
             hysteresis: f64::MAX,
-            slack_force: 0.8,
-            slack_torque: 0.025,
+            slack_force: 0.4,
+            slack_torque: 0.0125,
             abort_factor: 4.0,
             contact_force: 0.01,
         }
