@@ -85,6 +85,69 @@ fn bad_numbers_are_refused_by_name_and_leave_no_trace() {
 }
 
 #[test]
+fn huge_and_tiny_numbers_give_commandable_forces() {
+    for solver in BOTH {
+        let (sequence, good) = held_by_hand();
+        for number in [1e59, -1e59, 1e20, 1e-20, 1e-300, 0.0] {
+            let spoil: [fn(&mut Instance, f64); 9] = [
+                |i, x| i.G[(1, 1)] = x,
+                |i, x| i.G.fill(x),
+                |i, x| i.J[(0, 0)] = x,
+                |i, x| i.J.fill(x),
+                |i, x| i.F_des[2] = x,
+                |i, x| i.f_prev[11] = x,
+                |i, x| i.tau_min[3] = x,
+                |i, x| i.tau_max[3] = x,
+                |i, x| i.f_normal_max[1] = x,
+            ];
+            for spoil in spoil {
+                let mut tested = optimizer(&sequence, solver);
+                tested.solve(&good.problem()).unwrap();
+                let mut instance = good.clone();
+                spoil(&mut instance, number);
+                let solution = tested.solve(&instance.problem()).unwrap();
+                assert_finite(solution);
+                assert!(in_cones(&sequence.pyramids, &solution.f), "{number:e}: {solution:?}");
+                assert_eq!(tested.solve(&good.problem()).unwrap().status, ForceStatus::Solved);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_the_active_sets_leave_goes_to_clarabel() {
+    let settings = ForceSettings { max_changes: 3, ..ForceSettings::default() };
+    let mut exact = 0;
+    for (k, family) in instances::FAMILIES.iter().enumerate() {
+        let sequence = Sequence::new(&mut Random(13 + k as u64), *family, 4, 8);
+        let mut reference = optimizer(&sequence, SolverChoice::ActiveSet);
+        let mut f_prev = DVector::zeros(12);
+        for k in (0..Sequence::LENGTH).step_by(4) {
+            // Each time anew, so that three changes from a cold start are mostly too few.
+            let mut tested = ForceOptimizer::new(&sequence.pyramids, 12, settings.clone()).unwrap();
+            let instance = sequence.at(k, &f_prev);
+            let expected = reference.solve(&instance.problem()).unwrap().f.clone();
+            let found = tested.solve(&instance.problem()).unwrap().clone();
+            let counts = *tested.counts();
+            if found.solver == SolverUsed::ActiveSet {
+                assert_eq!(counts.fast_stopped, 0);
+            } else {
+                assert_eq!((counts.fast_stopped, counts.careful_undecided), (1, 1));
+            }
+            if found.status == ForceStatus::Solved {
+                assert!((&found.f - &expected).norm() <= 1e-5, "{family:?} step {k}: {:?}", found.solver);
+                exact += u32::from(found.solver == SolverUsed::ClarabelPolished);
+            } else {
+                // Three changes do not polish everything; what is not certified is not taken.
+                assert_eq!((counts.held, counts.clarabel_uncertified), (1, 1));
+            }
+            f_prev.copy_from(&expected);
+        }
+    }
+    assert!(exact >= 20, "{exact}");
+}
+
+#[test]
 fn wrong_shapes_are_refused_by_name() {
     let (sequence, good) = held_by_hand();
     let mut tested = optimizer(&sequence, SolverChoice::ActiveSet);

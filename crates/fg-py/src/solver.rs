@@ -124,8 +124,9 @@ impl ForceOptimizer {
         let core = &mut self.core;
         let (result, ns) = py.detach(|| {
             let clock = ThreadClock::start();
-            let result = core.solve(&problem).cloned();
-            (result, clock.elapsed_ns())
+            let result = core.solve(&problem);
+            let ns = clock.elapsed_ns();
+            (result.cloned(), ns)
         });
         Ok(ForceSolution { core: result.map_err(to_py)?, solve_ns: ns })
     }

@@ -9,7 +9,7 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, ZeroConeT};
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 
-/// What clarabel said. It is a candidate only: see [`super::kkt`] and [`super::polish`].
+/// What clarabel said. It is a candidate only: [`super::kkt`] judges it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// An answer, perhaps of reduced accuracy.

@@ -73,7 +73,7 @@ fn longest(qp: &ForceQp, f: &Forces) -> Option<f64> {
     (low <= high).then_some(high)
 }
 
-/// Golden-section-like search of the factor in 0..1 with the smallest violation, which is convex in the factor.
+/// Ternary search of the factor in 0..1 with the smallest violation, which is convex in the factor.
 fn least_violation(worst: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..80 {
@@ -85,4 +85,74 @@ fn least_violation(worst: impl Fn(f64) -> f64) -> f64 {
         }
     }
     low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::FrictionPyramid;
+    use crate::solver::qp::WIDTH;
+
+    /// Two contacts with one joint each that feels 0.1 m of the normal force.
+    fn qp(mu: f64, caps: [f64; 2], tau_min: [f64; 2], tau_max: [f64; 2]) -> ForceQp {
+        let pyramids = vec![FrictionPyramid::inscribed(mu, 4).unwrap(); 2];
+        let mut qp = ForceQp::new(&pyramids, 2, [0.01, 0.01, 1000.0]);
+        qp.set_objective(&[0.0; 36], &[0.0; 6], &[0.0; 6], &caps);
+        let mut J = [0.0; 12];
+        (J[2], J[11]) = (0.1, 0.1);
+        qp.set_torques(&J, &tau_min, &tau_max);
+        qp
+    }
+
+    fn forces(f: [f64; 6]) -> Forces {
+        let mut padded = [0.0; WIDTH];
+        padded[..6].copy_from_slice(&f);
+        padded
+    }
+
+    const NONE: f64 = f64::INFINITY;
+
+    fn close(held: (Forces, f64), f: [f64; 6], violation: f64) {
+        assert!(held.0.iter().zip(forces(f)).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", held.0);
+        assert!((held.1 - violation).abs() < 1e-12, "{}", held.1);
+    }
+
+    #[test]
+    fn feasible_forces_stay() {
+        let last = [0.5, 0.0, 2.0, 0.0, 0.0, 4.0];
+        close(hold(&qp(0.5, [NONE; 2], [-0.5; 2], [0.5; 2]), &forces(last)), last, 0.0);
+    }
+
+    #[test]
+    fn less_friction_takes_tangential_force() {
+        let held = hold(&qp(0.25, [NONE; 2], [-0.5; 2], [0.5; 2]), &forces([1.0, 0.0, 2.0, 0.0, 0.0, 4.0]));
+        close(held, [0.5, 0.0, 2.0, 0.0, 0.0, 4.0], 0.0);
+    }
+
+    #[test]
+    fn caps_shrink_one_contact_and_pins_zero_it() {
+        let held = hold(&qp(0.5, [1.0, 0.0], [-0.5; 2], [0.5; 2]), &forces([0.5, 0.0, 2.0, 0.0, 0.0, 4.0]));
+        close(held, [0.25, 0.0, 1.0, 0.0, 0.0, 0.0], 0.0);
+    }
+
+    #[test]
+    fn torques_shrink_all_contacts_alike() {
+        let held = hold(&qp(0.5, [NONE; 2], [-0.5; 2], [0.5, 0.2]), &forces([0.5, 0.0, 2.0, 0.0, 0.0, 4.0]));
+        close(held, [0.25, 0.0, 1.0, 0.0, 0.0, 2.0], 0.0);
+    }
+
+    #[test]
+    fn torques_that_nothing_meets_are_missed_by_the_least() {
+        // The first joint wants 3 N or more, the second 2 N or less: at 5/6 of the forces both miss by half a newton.
+        let held =
+            hold(&qp(0.5, [NONE; 2], [0.3, -0.5], [0.5, 0.2]), &forces([0.0, 0.0, 3.0, 0.0, 0.0, 3.0]));
+        assert!((held.0[2] - 2.5).abs() < 1e-9 && (held.0[5] - 2.5).abs() < 1e-9, "{:?}", held.0);
+        assert!((held.1 - 0.5).abs() < 1e-9, "{}", held.1);
+    }
+
+    #[test]
+    fn a_box_that_excludes_zero_is_met_where_it_can_be() {
+        let held = hold(&qp(0.5, [NONE; 2], [0.1, 0.1], [0.5, 0.2]), &forces([0.0, 0.0, 3.0, 0.0, 0.0, 4.0]));
+        close(held, [0.0, 0.0, 1.5, 0.0, 0.0, 2.0], 0.0);
+    }
 }

@@ -105,3 +105,63 @@ pub fn residual(
     let stationarity = dot(&gradient, &gradient).sqrt();
     Residual { stationarity, primal: violation(qp, f), complementarity }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::FrictionPyramid;
+
+    /// One contact, capped at 2 N, that should push 5 N along its normal: alpha1 = alpha3 = 1, so that it would push
+    /// 2.5 N, and does push 2 N with a multiplier of 1 N on the cap.
+    fn qp() -> ForceQp {
+        let mut qp = ForceQp::new(&[FrictionPyramid::inscribed(0.5, 4).unwrap()], 0, [1.0, 0.0, 1.0]);
+        let mut G = [0.0; 18];
+        (G[0], G[7], G[14]) = (1.0, 1.0, 1.0);
+        qp.set_objective(&G, &[0.0, 0.0, 5.0, 0.0, 0.0, 0.0], &[0.0; 3], &[2.0]);
+        qp.set_torques(&[], &[], &[]);
+        qp
+    }
+
+    const CAP: usize = 4;
+
+    fn at(z: f64, multipliers: &[(usize, f64)]) -> Residual {
+        let mut f = [0.0; WIDTH];
+        f[2] = z;
+        residual(&qp(), &f, multipliers.iter().copied())
+    }
+
+    #[test]
+    fn the_solution_has_none() {
+        assert!(at(2.0, &[(CAP, -1.0)]).worst() < 1e-15);
+    }
+
+    #[test]
+    fn each_condition_is_measured_in_newtons() {
+        let without_multiplier = at(2.0, &[]);
+        assert!((without_multiplier.stationarity - 1.0).abs() < 1e-15);
+        let too_far = at(2.5, &[]);
+        assert!(too_far.stationarity < 1e-15 && (too_far.primal - 0.5).abs() < 1e-15);
+        let pushing_in_the_air = at(1.5, &[(CAP, -2.0)]);
+        assert!(pushing_in_the_air.stationarity < 1e-15 && pushing_in_the_air.primal <= 0.0);
+        assert!((pushing_in_the_air.complementarity - 0.5).abs() < 1e-15);
+        // A multiplier that pulls at the cap acts at a lower bound which does not exist.
+        let pulling = at(2.0, &[(CAP, 1.0)]);
+        assert!((pulling.complementarity - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_infinitely_wrong() {
+        assert!(at(f64::NAN, &[]).worst().is_infinite());
+        assert!(at(2.0, &[(CAP, f64::NAN)]).worst().is_infinite());
+        assert!(!at(f64::NAN, &[]).certifies(1.0, 1.0, || f64::INFINITY));
+    }
+
+    #[test]
+    fn rounding_excuses_stationarity_alone() {
+        let stationarity = Residual { stationarity: 1e-6, primal: 0.0, complementarity: 0.0 };
+        assert!(!stationarity.certifies(1e-7, 1e-5, || 0.0));
+        assert!(stationarity.certifies(1e-7, 1e-5, || 2e-6));
+        assert!(!Residual { stationarity: 1e-4, ..stationarity }.certifies(1e-7, 1e-5, || 1.0));
+        assert!(!Residual { primal: 1e-6, ..stationarity }.certifies(1e-7, 1e-5, || 1.0));
+    }
+}
