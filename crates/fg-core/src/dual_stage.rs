@@ -81,8 +81,10 @@ macro_rules! scene {
 
 impl DualStagePlanner {
     /// The planner for `hand` with the robust controller `K`.
-    pub fn new(hand: HandModel, K: Controller, config: Config) -> Result<Self, Error> {
+    pub fn new(hand: HandModel, K: Controller, mut config: Config) -> Result<Self, Error> {
         config.validate()?;
+        // A force that may be commanded is not full scale.
+        config.safety.tactile_max = config.safety.tactile_max.max(1.2 * config.force.f_n_max);
         let dt = 1.0 / config.rate_hz;
         let (n, n_joints) = (hand.n_fingers(), hand.n_joints());
         let n_q = n * n_joints;

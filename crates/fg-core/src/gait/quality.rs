@@ -3,7 +3,7 @@
 use crate::config::{GaitConfig, QualityPlane};
 use crate::grasp::{Grasp, Scene};
 use crate::hand::HandModel;
-use nalgebra::{Isometry3, Matrix3, Unit, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Unit, Vector2, Vector3};
 
 /// The qualities of a grasp at one instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -150,8 +150,9 @@ fn best_fit_normal(grasp: &Grasp, chosen: impl Fn(usize) -> bool) -> Unit<Vector
         }
     } else {
         let scatter: Matrix3<f64> = points().map(|p| (p - mean) * (p - mean).transpose()).sum();
-        let eigen = scatter.symmetric_eigen();
-        eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned()
+        // Bounded: a control step never iterates until it converges.
+        SymmetricEigen::try_new(scatter, f64::EPSILON, 64)
+            .map_or(Vector3::z(), |eigen| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned())
     };
     let normal = Unit::try_new(normal, 1e-12).unwrap_or(Vector3::z_axis());
     if normal.z < 0.0 {

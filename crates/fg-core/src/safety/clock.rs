@@ -47,7 +47,7 @@ impl Clock {
         if elapsed.abs() < 0.01 * self.dt {
             faults.insert(Fault::Clock);
             self.stalled = (self.stalled + self.dt).min(1.0);
-            return match (self.stalled > self.config.clock_timeout, changed()) {
+            return match (self.stalled > self.config.clock_timeout + 0.5 * self.dt, changed()) {
                 (false, _) => Tick::Repeat,
                 (true, true) => Tick::Step(self.dt),
                 (true, false) => Tick::Blind,

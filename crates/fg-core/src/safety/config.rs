@@ -44,7 +44,7 @@ pub struct SafetyConfig {
     /// Time constant with which the pose that the fingers carry along follows a noisy or slow sensor, s; zero: the
     /// sensor's pose is used as it is.
     pub pose_filter: f64,
-    /// A tactile reading of this or more is full scale, N.
+    /// A tactile reading of this or more is full scale, N; never less than 1.2 times `force.f_n_max`.
     pub tactile_max: f64,
     /// A finger that feels and should press more than this is loaded, N.
     pub loaded_force: f64,
@@ -85,7 +85,7 @@ impl Default for SafetyConfig {
             stale_motion: [2e-3, 0.03],
             pose_blend: 0.05,
             pose_filter: 0.1,
-            tactile_max: 25.0,
+            tactile_max: 30.0,
             loaded_force: 0.3,
             lost_distance: 2e-3,
             lost_time: 0.05,

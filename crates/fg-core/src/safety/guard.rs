@@ -204,7 +204,7 @@ impl Guard {
             Tick::Blind => self.dt,
             Tick::Step(elapsed) => elapsed,
         };
-        self.admit_joints(measurement, elapsed, plan);
+        self.admit_joints(measurement, elapsed, plan, state);
         state.update(hand, self.trusted.q.as_slice());
         self.admit_touch(measurement, elapsed, plan, hand, state);
         self.admit_pose(measurement, elapsed, plan, hand, state);
@@ -244,15 +244,16 @@ impl Guard {
         self.faults.insert_if(saturated, Fault::Saturated);
     }
 
-    fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>) {
+    fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
         let tactile = &self.trusted.tactile;
         let using = |j: usize| {
             let free = plan.free == Some(j);
             let touching = tactile[j].f_n > 0.0;
             joints::Use { touching, holding: !free, qd_des: plan.qd_des.filter(|_| free) }
         };
-        let q = self.trusted.q.as_mut_slice();
-        self.joints.admit(measurement.q.as_slice(), elapsed, &self.odometry, using, q, &mut self.faults);
+        let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
+        let trusted = self.trusted.q.as_mut_slice();
+        self.joints.admit(q, elapsed, odometry, state, using, trusted, &mut self.faults);
         self.trusted.t = measurement.t;
         for (trusted, tau) in self.trusted.tau.iter_mut().zip(measurement.tau.iter()) {
             if tau.is_finite() {

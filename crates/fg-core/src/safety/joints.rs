@@ -4,12 +4,14 @@ use super::config::SafetyConfig;
 use super::debounce::Debounce;
 use super::odometry::Odometry;
 use super::{Fault, Faults};
-use crate::hand::HandModel;
+use crate::hand::{HandModel, HandState};
 
 /// Good samples before jumps are judged: the first one may be the bad one.
 const SETTLE: u32 = 10;
 /// Longest time for which a joint may have moved unseen, s.
 const UNSEEN: f64 = 1.0;
+/// Cosine between a joint's own motion and the motion left out, above which the joint may be the one that is stuck.
+const ALONG: f64 = 0.7;
 /// A finger off the object whose angle has jumped and then stays consistent for this long has been moved, s.
 const RELEARN: f64 = 0.5;
 
@@ -98,12 +100,15 @@ impl JointGuard {
         self.joints.iter().zip(q).all(|(joint, q)| joint.raw.to_bits() == q.to_bits())
     }
 
-    /// Writes into `trusted` the angles to use for the sample `q`; `elapsed` seconds have passed since the last one.
+    /// Writes into `trusted` the angles to use for the sample `q`; `elapsed` seconds have passed since the last one, whose
+    /// kinematics are `state`.
+    #[allow(clippy::too_many_arguments, reason = "one call, all of it needed")]
     pub fn admit<'a>(
         &mut self,
         q: &[f64],
         elapsed: f64,
         odometry: &Odometry,
+        state: &HandState,
         using: impl Fn(usize) -> Use<'a>,
         trusted: &mut [f64],
         faults: &mut Faults,
@@ -119,7 +124,7 @@ impl JointGuard {
                 joint.asked += speed * elapsed;
                 bad |= !joint.take(q[at.start + i], elapsed, settled, using.touching, &self.config);
             }
-            let stuck = self.stuck(j, &using, odometry);
+            let stuck = self.stuck(j, &using, odometry, state);
             faults.insert_if(bad, Fault::Encoder);
             faults.insert_if(stuck, Fault::EncoderStuck);
             // Getting stuck has taken its time already.
@@ -132,13 +137,23 @@ impl JointGuard {
     }
 
     /// Whether a joint of finger `j` reads the same number although the finger moves.
-    fn stuck(&mut self, j: usize, using: &Use<'_>, odometry: &Odometry) -> bool {
+    ///
+    /// A finger that slips moves against the object too. What tells the two apart is the direction: a stuck joint leaves out
+    /// its own part of the motion. Where all joints of a finger stand still, nothing does, and it counts as stuck.
+    fn stuck(&mut self, j: usize, using: &Use<'_>, odometry: &Odometry, state: &HandState) -> bool {
         let c = &self.config;
         let drift = odometry.drift(j);
-        let drifts = using.holding && drift > c.stuck_distance && drift > 3.0 * odometry.drift_of_others(j);
+        let length = drift.norm();
+        let drifts = using.holding && length > c.stuck_distance && length > 3.0 * odometry.drift_of_others(j);
+        let joints = &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints];
+        let all = joints.iter().all(|joint| joint.still > c.stuck_time);
         let mut stuck = false;
-        for joint in &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints] {
-            joint.stuck |= joint.still > c.stuck_time && (drifts || joint.asked.abs() > c.stuck_angle);
+        for (i, joint) in joints.iter_mut().enumerate() {
+            if joint.still > c.stuck_time {
+                let column = || state.jacobian_column(j, i, odometry.contact(j));
+                let own = || column().dot(&drift).abs() > ALONG * column().norm() * length;
+                joint.stuck |= (drifts && (all || own())) || joint.asked.abs() > c.stuck_angle;
+            }
             if joint.stuck {
                 // The true angle may be anywhere that it can have reached meanwhile.
                 joint.missing = joint.still.min(UNSEEN);

@@ -33,7 +33,7 @@ impl TorqueLimiter {
         let mut saturated = false;
         for (tau, previous) in tau.iter_mut().zip(self.previous.iter_mut()) {
             let wanted = if tau.is_finite() { *tau } else { *previous };
-            saturated |= wanted.abs() >= self.limit;
+            saturated |= wanted.abs() >= self.limit * (1.0 - 1e-6);
             *tau = wanted.clamp(*previous - self.change, *previous + self.change);
             *tau = tau.clamp(-self.limit, self.limit);
             *previous = *tau;

@@ -110,12 +110,17 @@ impl Odometry {
         self.X_WO = Some(*X_WO);
     }
 
-    /// Distance by which the object has moved against finger `j` while both should stick, m.
-    pub fn drift(&self, j: usize) -> f64 {
-        self.tips[j].drift.norm()
+    /// How far the object has moved against finger `j` while both should stick, in W, m.
+    pub fn drift(&self, j: usize) -> Vector3<f64> {
+        self.tips[j].drift
     }
 
-    /// Mean of [`Odometry::drift`] over the other fingers that stick, m.
+    /// The contact of finger `j` in W while it sticks, m.
+    pub fn contact(&self, j: usize) -> &Vector3<f64> {
+        &self.tips[j].now
+    }
+
+    /// Mean length of [`Odometry::drift`] over the other fingers that stick, m.
     pub fn drift_of_others(&self, j: usize) -> f64 {
         let others = || self.tips.iter().enumerate().filter(|(k, tip)| *k != j && tip.sticks);
         others().map(|(_, tip)| tip.drift.norm()).sum::<f64>() / others().count().max(1) as f64

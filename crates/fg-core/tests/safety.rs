@@ -1,0 +1,195 @@
+//! The table of faults in `docs/safety.md`, row by row: sensors that fail.
+//!
+//! The measurements are those of a recorded run in which the object turns; faults are put into them. That the object
+//! survives is tested in the closed loop, in `tests/test_safety.py`.
+#![allow(non_snake_case)] // the paper's letters, as in fg-core
+#![allow(clippy::float_cmp)] // what must be zero must be exactly zero
+
+#[path = "../benches/recording/mod.rs"]
+mod recording;
+mod replay;
+
+use fg_core::safety::{Fault, SafeMode};
+use fg_core::signals::Measurement;
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
+use recording::{Recording, NOISY, ROTATE};
+use replay::{Replay, BEGIN, RECOVERY};
+
+const NANS: [f64; 4] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308];
+
+#[test]
+fn nothing_is_wrong_with_a_run_whose_sensors_are_fit() {
+    for bytes in [ROTATE, NOISY] {
+        let recording = Recording::parse(bytes);
+        let mut planner = recording.planner();
+        for (k, (measurement, reference)) in recording.rows.iter().enumerate() {
+            planner.step(measurement, reference).unwrap();
+            let d = planner.diagnostics();
+            assert!(d.faults.is_empty() && d.safe_mode == SafeMode::Normal, "step {k}: {:?}", d.faults);
+        }
+        assert!(planner.diagnostics().gaits > 0);
+    }
+}
+
+#[test]
+fn a_measurement_that_is_not_finite_is_ridden_through() {
+    for x in NANS {
+        Replay::under_way().rides_through(Fault::Encoder, 3, 0.04, |_, m, _| m.q[4] = x);
+        Replay::under_way().rides_through(Fault::Pose, 3, 0.04, |_, m, _| m.X_WO.translation.y = x);
+        Replay::under_way().rides_through(Fault::Tactile, 3, 0.04, |_, m, _| m.tactile[1].p_FC.z = x);
+        Replay::under_way().rides_through(Fault::Reference, 3, 0.04, |_, _, r| r.V_WD[5] = x);
+        Replay::under_way().rides_through(Fault::Clock, 3, 0.04, |_, m, _| m.t = x);
+    }
+    // The step does not use the measured torques.
+    Replay::under_way().rides_through(Fault::TorqueSensor, 50, 0.0, |_, m, _| m.tau[0] = f64::NAN);
+}
+
+#[test]
+fn a_pose_that_jumps_is_replaced_by_what_the_fingers_tell() {
+    let jump = |m: &mut Measurement| m.X_WO.translation.vector += Vector3::new(0.03, 0.0, 0.01);
+    Replay::under_way().rides_through(Fault::PoseJump, 4, 0.04, |_, m, _| jump(m));
+    Replay::under_way().suffers(Fault::PoseJump, SafeMode::Squeeze, 0, |_, m, _| jump(m));
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.5, 0.0));
+    Replay::under_way()
+        .suffers(Fault::PoseJump, SafeMode::Squeeze, 0, |_, m, _| m.X_WO.rotation = turn * m.X_WO.rotation);
+    // While it is off, what K is given stays with the object.
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 50, |_, m, _| jump(m));
+    // The recorded object turns on against the reference that stands, as it would with a pose.
+    let mut other = Replay::under_way();
+    other.run(BEGIN..BEGIN + 50, |_, m, _| m.tactile[3].f_n = 1e3);
+    assert!((replay.planner.diagnostics().e - other.planner.diagnostics().e).norm() < 0.01);
+}
+
+#[test]
+fn a_pose_that_is_none_squeezes() {
+    let zero = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 0.0, 0.0, 0.0));
+    Replay::under_way().suffers(Fault::Pose, SafeMode::Squeeze, 0, |_, m, _| m.X_WO.rotation = zero);
+    let far = Isometry3::translation(50.0, 0.0, 0.0);
+    Replay::under_way().suffers(Fault::Pose, SafeMode::Squeeze, 0, |_, m, _| m.X_WO = far);
+    // The fingers press harder, by about what the configuration says.
+    let mut replay = Replay::under_way();
+    let pressing = |replay: &Replay| (0..4).map(|j| replay.planner.diagnostics().f[3 * j + 2]).sum::<f64>();
+    let before = pressing(&replay);
+    replay.run(BEGIN..BEGIN + 100, |_, m, _| m.X_WO.translation.x = f64::NAN);
+    assert!(pressing(&replay) > before + 1.0, "{before} {}", pressing(&replay));
+}
+
+#[test]
+fn a_pose_that_goes_stale_squeezes_once_the_object_has_moved() {
+    let stale = Replay::under_way().recording.rows[BEGIN].0.X_WO;
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 49, |_, m, _| m.X_WO = stale);
+    assert!(!replay.has(Fault::PoseStale), "younger than safety.pose_timeout");
+    replay.run(BEGIN + 49..BEGIN + 200, |_, m, _| m.X_WO = stale);
+    assert!(replay.has(Fault::PoseStale));
+    assert_eq!(replay.mode(), SafeMode::Squeeze);
+    replay.run(BEGIN + 200..BEGIN + 200 + RECOVERY, |_, _, _| ());
+    assert_eq!(replay.mode(), SafeMode::Normal);
+}
+
+#[test]
+fn a_pose_that_stands_still_with_the_object_is_fit() {
+    let mut replay = Replay::new(|_| ());
+    // Nothing moves at all but time, as with a quiet sensor.
+    let (still, reference) = replay.recording.rows[700].clone();
+    replay.run(0..700, |_, _, _| ());
+    replay.run(700..1100, |k, m, r| {
+        *m = Measurement { t: k as f64 / 500.0, ..still.clone() };
+        *r = reference;
+    });
+    assert_eq!(replay.mode(), SafeMode::Normal);
+    assert!(replay.planner.diagnostics().faults.is_empty());
+}
+
+#[test]
+fn an_encoder_that_is_stuck_holds_with_its_last_angle() {
+    let mut replay = Replay::under_way();
+    let stuck = replay.recording.rows[BEGIN].0.q[7];
+    let end = 2100;
+    let mut since = None;
+    for k in BEGIN..end {
+        replay.run(k..k + 1, |_, m, _| m.q[7] = stuck);
+        if replay.has(Fault::EncoderStuck) {
+            since = since.or(Some(k));
+        }
+    }
+    let since = since.expect("detected");
+    assert!(replay.has(Fault::EncoderStuck), "first at {since}");
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    replay.run(end..end + RECOVERY, |_, _, _| ());
+    assert_eq!(replay.mode(), SafeMode::Normal);
+}
+
+#[test]
+fn an_encoder_out_of_range_or_off_holds_with_its_last_angle() {
+    for x in [10.0, -10.0, 1e308, f64::NAN] {
+        Replay::under_way().suffers(Fault::Encoder, SafeMode::Hold, 0, |_, m, _| m.q[3] = x);
+    }
+    Replay::under_way().suffers(Fault::Encoder, SafeMode::Hold, 0, |_, m, _| m.q[2] += 0.5);
+}
+
+#[test]
+fn a_finger_without_angles_or_contact_is_damped() {
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 400, |_, m, _| {
+        m.q[0] = f64::NAN;
+        m.q[5] += 1e-12; // not the same number again and again
+        m.tactile[0].f_n = 0.0;
+        // The finger moves in, so the sensor is believed.
+        m.q[2] = f64::NAN;
+        m.q[1] = f64::NAN;
+    });
+    // Its angles being unknown, an advance cannot be seen: the sensor counts as lost, and the finger as holding.
+    assert!(replay.has(Fault::Encoder) && replay.has(Fault::TactileLost));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    // A finger that was off the object when its encoders failed holds nothing.
+    let mut replay = Replay::new(|_| ());
+    replay.run(0..BEGIN, |_, m, _| m.tactile[0].f_n = 0.0);
+    replay.run(BEGIN..BEGIN + 200, |_, m, _| {
+        m.tactile[0].f_n = 0.0;
+        m.q[0] = f64::NAN;
+    });
+    assert_eq!(replay.mode(), SafeMode::Damp);
+    let f = &replay.planner.diagnostics().f;
+    assert_eq!(f.rows(0, 3).amax(), 0.0);
+    replay.run(BEGIN + 200..BEGIN + 200 + RECOVERY, |_, _, _| ());
+    assert_eq!(replay.mode(), SafeMode::Normal);
+}
+
+#[test]
+fn a_tactile_sensor_that_is_lost_is_replaced_by_the_force_commanded() {
+    // safety.lost_time is 25 steps: a finger may bounce.
+    let lost = |m: &mut Measurement, j: usize| m.tactile[j].f_n = 0.0;
+    Replay::under_way().suffers(Fault::TactileLost, SafeMode::Hold, 26, |_, m, _| lost(m, 1));
+    Replay::under_way()
+        .suffers(Fault::TactileLost, SafeMode::Hold, 26, |_, m, _| (0..4).for_each(|j| lost(m, j)));
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 20, |_, m, _| lost(m, 1));
+    assert_eq!(replay.mode(), SafeMode::Normal);
+    assert!(replay.planner.diagnostics().faults.is_empty());
+    let d = replay.planner.diagnostics();
+    assert!((d.f_n[1] - d.f[5]).abs() < 0.2, "{} {}", d.f_n[1], d.f[5]);
+}
+
+#[test]
+fn a_tactile_sensor_that_is_stuck_is_replaced_by_the_force_commanded() {
+    for full in [30.0, 50.0, 1e3] {
+        Replay::under_way()
+            .suffers(Fault::TactileStuck, SafeMode::Hold, 0, |_, m, _| m.tactile[3].f_n = full);
+    }
+    // A constant below full scale takes safety.stuck_time.
+    Replay::under_way().suffers(Fault::TactileStuck, SafeMode::Hold, 52, |_, m, _| m.tactile[3].f_n = 12.0);
+    for bad in [f64::NAN, -5.0, 1e308] {
+        let mut replay = Replay::under_way();
+        replay.run(BEGIN..BEGIN + 100, |_, m, _| m.tactile[3].f_n = bad);
+        assert_eq!(replay.mode(), SafeMode::Hold);
+    }
+}
+
+#[test]
+fn a_tactile_place_off_the_fingertip_is_replaced_by_the_last_one() {
+    for place in [Vector3::new(1.0, 0.0, 0.0), Vector3::zeros(), Vector3::repeat(1e200)] {
+        Replay::under_way().suffers(Fault::Tactile, SafeMode::Hold, 0, |_, m, _| m.tactile[2].p_FC = place);
+    }
+}

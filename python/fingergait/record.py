@@ -1,0 +1,71 @@
+"""Records what a control step is given in a run, for the benches, the soak and the fuzzers of the core.
+
+A recording is one line of JSON and, behind its line feed, rows of single-precision numbers, little-endian. The line
+has `format`, `scenario`, `hand` (as for `HandModel`), `controller` (the artefact), `config` (of the core, what is not default),
+`fingers`, `joints`, `rate_hz` and `rows`. A row is q, tau, the pose wxyz, the tactile places and forces, then the
+reference's pose and twist.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from fingergait import _core
+from fingergait.hand import hand_json
+from fingergait.paths import find
+from fingergait.plant import MujocoPlant
+from fingergait.reference import Trajectory
+from fingergait.scenario import Scenario, parse_override
+from fingergait.simulate import load_controller
+
+FORMAT = "fingergait-recording/1"
+
+
+def record(scenario: Scenario, out: Path) -> int:
+    """Runs a scenario in the closed loop and writes its measurements and references to `out`; gives the rows."""
+    plant = MujocoPlant(scenario)
+    hand = hand_json(find(scenario.hand.file, "", ".xml", "hand.file"))
+    planner = _core.DualStagePlanner(_core.HandModel(hand), load_controller(scenario), plant.config)
+    artefact = find(scenario.controller.file, "controllers", ".json", "controller.file").read_text(encoding="utf-8")
+    measurement = plant.reset()
+    trajectory = Trajectory(scenario.reference, plant.sensors.pose)
+    rows = []
+    for _ in range(round((scenario.duration + scenario.grasp.settle) * scenario.controller.rate_hz)):
+        pose, twist = trajectory.sample(plant.t)
+        rows.append(np.concatenate([plant.sensors.row, pose, twist]))
+        command, _ = planner.step(measurement, _core.Reference(pose, twist))
+        measurement = plant.step(command)
+    plant.close()
+    head = {
+        "format": FORMAT,
+        "scenario": scenario.model_dump(mode="json", exclude_unset=True),
+        "hand": json.loads(hand),
+        "controller": {key: value for key, value in json.loads(artefact).items() if key != "provenance"},
+        "config": json.loads(plant.config),
+        "fingers": len(plant.scene.fingers),
+        "joints": plant.scene.n_joints,
+        "rate_hz": scenario.controller.rate_hz,
+        "rows": len(rows),
+    }
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with out.open("wb") as file:
+        file.write(json.dumps(head, separators=(",", ":")).encode() + b"\n")
+        file.write(np.asarray(rows, dtype="<f4").tobytes())
+    return len(rows)
+
+
+def main() -> None:
+    """The command `python -m fingergait.record`."""
+    parser = argparse.ArgumentParser(prog="python -m fingergait.record", description=record.__doc__)
+    parser.add_argument("scenario", help="a packaged scenario's name, or a TOML file")
+    parser.add_argument("out", type=Path, help="the file to write")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a scenario key")
+    arguments = parser.parse_args()
+    scenario = Scenario.load(arguments.scenario, dict(map(parse_override, arguments.set)))
+    print(f"{arguments.out}: {record(scenario, arguments.out)} rows")
+
+
+if __name__ == "__main__":
+    main()
