@@ -1,0 +1,84 @@
+"""The table of faults in docs/safety.md in the closed loop: the object survives, and all returns to normal."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fingergait as fg
+from fingergait.scenario import Scenario
+
+AT, LAST, END = 2.0, 0.6, 4.5  # s: the object has been lifted and turns; gaits begin later
+MODES = {"normal": 0, "hold": 1, "squeeze": 2, "damp": 3, "stop": 4}
+BITS = {
+    name: 1 << bit
+    for bit, name in enumerate(
+        "clock late encoder encoder_stuck pose pose_jump pose_stale tactile tactile_lost tactile_stuck".split()
+    )
+}
+
+FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
+    ({"kind": "sensor_nan", "sensor": "encoder", "finger": 1}, "encoder", "hold"),
+    ({"kind": "sensor_nan", "sensor": "encoder"}, "encoder", "hold"),
+    ({"kind": "sensor_nan", "sensor": "pose"}, "pose", "squeeze"),
+    ({"kind": "sensor_nan", "sensor": "tactile", "finger": 2}, "tactile", "hold"),
+    ({"kind": "sensor_nan", "sensor": "tactile"}, "tactile", "hold"),
+    ({"kind": "pose_jump", "shift": [0.03, 0.0, 0.02, 0.0, 0.0, 0.0]}, "pose_jump", "squeeze"),
+    ({"kind": "pose_jump", "shift": [0.0, 0.0, 0.0, 0.0, 0.0, 0.8]}, "pose_jump", "squeeze"),
+    ({"kind": "pose_stale"}, "pose_stale", "squeeze"),
+    ({"kind": "encoder_stuck", "finger": 0, "joint": 1, "duration": 2.0}, None, "hold"),
+    ({"kind": "encoder_range", "finger": 3, "joint": 2}, "encoder", "hold"),
+    ({"kind": "tactile_lost", "finger": 1}, "tactile_lost", "hold"),
+    ({"kind": "tactile_lost"}, "tactile_lost", "hold"),
+    ({"kind": "tactile_stuck", "finger": 0}, "tactile_stuck", "hold"),
+    ({"kind": "clock_stall"}, "clock", "hold"),
+    ({"kind": "clock_jump", "shift": -5.0}, "clock", "normal"),
+    ({"kind": "dropped_ticks", "ticks": 5, "every": 50}, "late", "normal"),
+]
+
+
+@pytest.mark.parametrize(
+    ("fault", "bit", "mode"), FAULTS, ids=lambda value: value.get("kind") if isinstance(value, dict) else None
+)
+def test_object_survives_and_all_returns_to_normal(fault: dict[str, Any], bit: str | None, mode: str) -> None:
+    scenario = Scenario.load(
+        "lift-and-rotate",
+        {"duration": END + (1.0 if "duration" in fault else 0.0), "fault": [{"at": AT, "duration": LAST, **fault}]},
+    )
+    run = fg.simulate(scenario)
+    log = run.log
+    assert not run.metrics["dropped"]
+    assert run.metrics["max_position_error_m"] < 2e-3
+    faults = log["faults"].astype(int)
+    if bit is not None:
+        assert np.any(faults & BITS[bit])
+    assert log["safe_mode"].max() <= MODES[mode]
+    if bit is not None:
+        assert log["safe_mode"].max() == MODES[mode]
+    assert faults[-1] == 0
+    assert log["safe_mode"][-1] == 0
+
+
+@pytest.mark.parametrize(
+    "sensors",
+    [
+        {},
+        {"position_noise": 2e-4, "orientation_noise": 2e-3, "contact_place_noise": 3e-4, "contact_force_noise": 0.05},
+        {"pose_rate_hz": 60.0, "pose_delay_s": 0.03},
+        {"encoder_bits": 12},
+        {
+            "position_noise": 2e-4,
+            "orientation_noise": 2e-3,
+            "pose_rate_hz": 60.0,
+            "pose_delay_s": 0.03,
+            "encoder_bits": 12,
+        },
+    ],
+    ids=["ideal", "noise", "slow", "bits", "all"],
+)
+def test_sensors_that_are_fit_raise_no_fault(sensors: dict[str, float]) -> None:
+    overrides = {f"sensors.{key}": value for key, value in sensors.items()} | {"duration": 8.0}
+    run = fg.simulate(Scenario.load("lift-and-rotate", overrides))
+    assert not run.metrics["dropped"]
+    assert not run.log["faults"].any()
+    assert not run.log["safe_mode"].any()
