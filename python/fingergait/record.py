@@ -2,8 +2,8 @@
 
 A recording is one line of JSON and, behind its line feed, rows of single-precision numbers, little-endian. The line
 has `format`, `scenario`, `hand` (as for `HandModel`), `controller` (the artefact), `config` (of the core, what is not
-default), `fingers`, `joints`, `rate_hz` and `rows`. A row is q, tau, the pose wxyz, the tactile places and forces, then the
-reference's pose and twist.
+default), `fingers`, `joints`, `rate_hz` and `rows`. A row is q, tau, the pose wxyz, the tactile places and forces, then
+the reference's pose and twist.
 """
 
 import argparse
