@@ -112,6 +112,9 @@ class Diagnostics:
     @property
     def step_ns(self) -> int:
         """Thread CPU time of this control step inside the compiled core, ns."""
+    @property
+    def step_allocations(self) -> int:
+        """Heap allocations of this control step inside the compiled core."""
     @staticmethod
     def columns(n_fingers: int, n_joints: int) -> list[str]:
         """Names of the numbers that `row` gives, in order."""
@@ -154,6 +157,9 @@ class ForceSolution:
     def kkt(self) -> float: ...
     @property
     def solve_ns(self) -> int: ...
+    @property
+    def solve_allocations(self) -> int:
+        """Heap allocations of the solve."""
 
 @final
 class ForceOptimizer:

@@ -132,6 +132,20 @@ def synthesize(
 
 
 @app.command()
+def bench(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the rows and the plot go.")] = Path("runs/bench"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer steps and problems.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Time the control step and its solvers, beside other solvers where they are installed."""
+    from fingergait.bench.run import run_bench
+
+    result = run_bench(out, quick, Console(stderr=True) if as_json else Console())
+    if as_json:
+        print_json(result)
+
+
+@app.command()
 def check(
     file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],
 ) -> None:

@@ -4,6 +4,7 @@
 
 use pyo3::prelude::*;
 
+mod allocations;
 mod controller;
 mod convert;
 mod cpu_clock;

@@ -85,6 +85,7 @@ impl Command {
 pub struct Diagnostics {
     core: CoreDiagnostics,
     step_ns: u64,
+    step_allocations: u64,
 }
 
 #[pymethods]
@@ -147,6 +148,12 @@ impl Diagnostics {
         self.step_ns
     }
 
+    /// Heap allocations of this control step inside the compiled core.
+    #[getter]
+    fn step_allocations(&self) -> u64 {
+        self.step_allocations
+    }
+
     /// Names of the numbers that `row` gives, in order.
     #[staticmethod]
     fn columns(n_fingers: usize, n_joints: usize) -> Vec<String> {
@@ -188,14 +195,15 @@ impl DualStagePlanner {
         reference: &Reference,
     ) -> PyResult<(Command, Diagnostics)> {
         let planner = &mut self.0;
-        let (outcome, step_ns) = py.detach(|| {
+        let (outcome, step_ns, step_allocations) = py.detach(|| {
             let clock = ThreadClock::start();
-            let outcome = planner.step(&measurement.0, &reference.0).cloned();
-            (outcome, clock.elapsed_ns())
+            let outcome = planner.step(&measurement.0, &reference.0);
+            let (ns, allocations) = (clock.elapsed_ns(), clock.allocations());
+            (outcome.cloned(), ns, allocations)
         });
         let command = outcome.map_err(to_py)?;
         let n_joints = self.0.hand().n_joints();
-        let diagnostics = Diagnostics { core: self.0.diagnostics().clone(), step_ns };
+        let diagnostics = Diagnostics { core: self.0.diagnostics().clone(), step_ns, step_allocations };
         Ok((Command { tau: command.tau, n_joints }, diagnostics))
     }
 

@@ -122,13 +122,13 @@ impl ForceOptimizer {
             f_normal_max: f_normal_max.as_slice(),
         };
         let core = &mut self.core;
-        let (result, ns) = py.detach(|| {
+        let (result, solve_ns, solve_allocations) = py.detach(|| {
             let clock = ThreadClock::start();
             let result = core.solve(&problem);
-            let ns = clock.elapsed_ns();
-            (result.cloned(), ns)
+            let (ns, allocations) = (clock.elapsed_ns(), clock.allocations());
+            (result.cloned(), ns, allocations)
         });
-        Ok(ForceSolution { core: result.map_err(to_py)?, solve_ns: ns })
+        Ok(ForceSolution { core: result.map_err(to_py)?, solve_ns, solve_allocations })
     }
 }
 
@@ -137,6 +137,7 @@ impl ForceOptimizer {
 pub struct ForceSolution {
     core: force::ForceSolution,
     solve_ns: u64,
+    solve_allocations: u64,
 }
 
 #[pymethods]
@@ -175,6 +176,11 @@ impl ForceSolution {
     #[getter]
     fn solve_ns(&self) -> u64 {
         self.solve_ns
+    }
+    /// Heap allocations of the solve.
+    #[getter]
+    fn solve_allocations(&self) -> u64 {
+        self.solve_allocations
     }
 }
 
