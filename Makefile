@@ -44,6 +44,7 @@ check: setup
 
 bench: setup
 	cargo bench --workspace --locked
+	$(BIN)/fingergait bench
 
 clean:
 	rm -rf .venv target
