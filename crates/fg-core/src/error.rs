@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use thiserror::Error;
 
-/// A caller's mistake. Numerical trouble is not an error: it is reported in [`crate::signals::Diagnostics`].
+/// A caller's mistake. Numerical trouble is not an error: it is reported in [`crate::diagnostics::Diagnostics`].
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum Error {
     /// A configuration or hand value out of its range.

@@ -222,7 +222,6 @@ impl RobustController {
     }
 }
 
-/// The force that gravity exerts on a nominal object, and the sign in which it is compensated.
 #[cfg(test)]
 mod tests {
     use super::*;
