@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from fingergait.log import Log
 from fingergait.pose_error import pose_errors
+from fingergait.report.thin import thin
 from fingergait.scenario import Scenario
 
 Array = NDArray[np.float64]
 
-_POINTS = 6000  # a plot shows at most about as many samples
 _FINGER_COLOURS = ("#4C72B0", "#DD8452", "#55A868", "#C44E52", "#8172B3", "#937860")
 
 
@@ -41,9 +41,9 @@ def error_figure(log: Log, scenario: Scenario) -> Figure:
     for axes, (label, values, names) in zip(figure.axes, rows, strict=True):
         _shade_pulses(axes, scenario)
         norm = np.linalg.norm(values, axis=1)
-        axes.fill_between(*_thin(log.t, norm), color="black", alpha=0.15, lw=0.0, label="norm")
+        axes.fill_between(*thin(log.t, norm), color="black", alpha=0.15, lw=0.0, label="norm")
         for index, name in enumerate(names):
-            axes.plot(*_thin(log.t, values[:, index]), lw=0.8, label=name.upper())
+            axes.plot(*thin(log.t, values[:, index]), lw=0.8, label=name.upper())
         axes.set_ylabel(label)
         axes.legend(loc="upper right", ncols=4, fontsize=8)
     return figure
@@ -55,10 +55,10 @@ def quality_figure(log: Log, scenario: Scenario) -> Figure:
     quality, rate = figure.axes
     for axes in figure.axes:
         _shade_gaits(axes, log)
-    quality.plot(*_thin(log.t, log["Q"]), lw=0.9, color="black", label="Q")
-    quality.plot(*_thin(log.t, log["threshold"]), lw=0.9, ls="--", color="black", label="threshold")
+    quality.plot(*thin(log.t, log["Q"]), lw=0.9, color="black", label="Q")
+    quality.plot(*thin(log.t, log["threshold"]), lw=0.9, ls="--", color="black", label="threshold")
     quality.set_ylabel("Q, eq. (1)")
-    rate.plot(*_thin(log.t, log["Q_dot"]), lw=0.8, color="black", label="predicted dQ/dt")
+    rate.plot(*thin(log.t, log["Q_dot"]), lw=0.8, color="black", label="predicted dQ/dt")
     rate.set_ylabel("dQ/dt of the LP [1/s]")
     for index, name in enumerate(log.fingers):
         quality.fill_between([], [], color=_colour(index), alpha=0.3, label=name)
@@ -73,8 +73,8 @@ def force_figure(log: Log, scenario: Scenario) -> Figure:
     commands = np.abs(log.block("tau_des")).reshape(len(log), len(log.fingers), -1).max(axis=2)
     measured = log.block("measured_force")
     for index, name in enumerate(log.fingers):
-        forces.plot(*_thin(log.t, measured[:, index]), lw=0.7, color=_colour(index), label=name)
-        torques.plot(*_thin(log.t, commands[:, index]), lw=0.7, color=_colour(index), label=name)
+        forces.plot(*thin(log.t, measured[:, index]), lw=0.7, color=_colour(index), label=name)
+        torques.plot(*thin(log.t, commands[:, index]), lw=0.7, color=_colour(index), label=name)
     forces.set_ylabel("normal force [N]")
     torques.set_ylabel("largest joint torque [N m]")
     for axes in figure.axes:
@@ -92,17 +92,6 @@ def _figure(title: str, rows: int) -> Figure:
         ax.margins(x=0.0)
     axes[-1].set_xlabel("time [s]")
     return figure
-
-
-def _thin(t: Array, values: Array) -> tuple[Array, Array]:
-    """Smallest and largest value of each bin, so that a thinned line keeps its peaks."""
-    if len(t) <= _POINTS:
-        return t, values
-    size = -(-len(t) // (_POINTS // 2))
-    bins = len(t) // size
-    blocks = values[: bins * size].reshape(bins, size)
-    order = np.stack([blocks.min(axis=1), blocks.max(axis=1)], axis=1)
-    return np.repeat(t[: bins * size : size], 2), order.ravel()
 
 
 def _shade_gaits(axes: Axes, log: Log) -> None:

@@ -13,6 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingergait.report.thin import thin as report_thin
+
 Array = NDArray[np.float64]
 P = ParamSpec("P")
 
@@ -72,14 +74,8 @@ def panels(rows: int, columns: int = 1, height: float = 1.9, share: bool = True)
 
 
 def thin(t: Array, values: Array) -> tuple[Array, Array]:
-    """Smallest and largest value of each bin, so that a thinned line keeps its peaks."""
-    if len(t) <= _POINTS:
-        return t, values
-    size = -(-len(t) // (_POINTS // 2))
-    bins = len(t) // size
-    blocks = values[: bins * size].reshape(bins, size)
-    order = np.stack([blocks.min(axis=1), blocks.max(axis=1)], axis=1)
-    return np.repeat(t[: bins * size : size], 2), order.ravel()
+    """A line of a figure of the page, thinned to what its width can show."""
+    return report_thin(t, values, _POINTS)
 
 
 def shade(axes: Axes, t: Array, free: Array) -> None:
