@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 SETTLED = 0.05  # of the step, the paper's threshold
 RECOVERED = 0.10  # of the peak
-_BEFORE = 0.5  # s before a pulse that say how large the error was without it
+_BEFORE = 1.0  # s before a pulse that say how large the error was without it; a gait takes about as long
 _AFTER = 2.0  # s after a pulse in which its peak and recovery are sought, unless the next one begins
 
 
@@ -94,7 +94,7 @@ def settling_times(t: Array, errors: Array, step: tuple[float, ...], at: float) 
 def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturbance, until: float) -> float | None:
     """Time from a pulse's end until the error it caused has gone for good, s; None where it hasn't by `until`.
 
-    Gone: back under the largest error of the half second before the pulse plus 10 % of the peak above it. A force is
+    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it. A force is
     judged by the position error (T,), a torque by the orientation error (T,), both by the later of the two.
     """
     times = []

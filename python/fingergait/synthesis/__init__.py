@@ -5,6 +5,7 @@ from .certificate import Certificate
 from .contact_plant import ReflectedHand, reflect
 from .dk import DKResult, Iteration, dk_iteration
 from .errors import InfeasibleSpecError, LibraryError, SpecError, SynthesisError
+from .identify import identify_damping
 from .mu import mu_bounds
 from .spec import SynthesisSpec
 from .statespace import StateSpace
@@ -25,6 +26,7 @@ __all__ = [
     "SynthesisSpec",
     "dk_iteration",
     "hand_tuned",
+    "identify_damping",
     "mu_bounds",
     "reflect",
     "synthesize",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .blocks import parse_blocks
+from .blocks import parse_blocks, real_scalars
 from .loop import hold
 from .mu_lower import lower_bound
 from .mu_upper import upper_bound
@@ -55,7 +55,13 @@ class Problem:
 
 
 def mu_curve(
-    problems: Sequence[Problem], omega: Array, delay: float, *, lower: bool = True, refine: int = 12
+    problems: Sequence[Problem],
+    omega: Array,
+    delay: float,
+    *,
+    real: bool = False,
+    lower: bool = True,
+    refine: int = 12,
 ) -> MuCurve:
     """mu of one problem, or of several that share no coupling, on a grid that is refined around the peak.
 
@@ -67,10 +73,12 @@ def mu_curve(
     Parameters
     ----------
     delay : s, from the sample to the actuators; for a continuous K, the whole dead time
+    real : whether the scalars of Delta are real (D-G scalings), or may be any complex numbers (D scalings; higher)
     lower : whether to find the lower bound as well
     refine : extra frequencies on each side of the peak
     """
-    structures = [parse_blocks(problem.plant.blocks()) for problem in problems]
+    kind = real_scalars if real else list
+    structures = [parse_blocks(kind(problem.plant.blocks())) for problem in problems]
 
     def responses(w: Array) -> list[ComplexArray]:
         return [response(problem.plant, problem.K, w, delay) for problem in problems]
@@ -82,7 +90,12 @@ def mu_curve(
     grid, values = refined(below_nyquist(omega, problems[0].K.dt), bound, refine)
     if not lower:
         return MuCurve(grid, values, np.zeros_like(values))
-    low = np.max([lower_bound(M, s) for M, s in zip(responses(grid), structures, strict=True)], axis=0)
+    low = np.zeros_like(values)
+    for M, blocks in zip(responses(grid), structures, strict=True):
+        # A part whose upper bound is no higher than what another part has proven can't raise it.
+        higher = upper_bound(M, blocks, tolerance=1e-3).value > 1.01 * low
+        if higher.any():
+            low[higher] = np.maximum(low[higher], lower_bound(M[higher], blocks))
     return MuCurve(grid, values, np.minimum(low, values))
 
 

@@ -58,6 +58,11 @@ def parse_blocks(blocks: Sequence[tuple[int, int]]) -> list[Block]:
     return parsed
 
 
+def real_scalars(blocks: Sequence[tuple[int, int]]) -> Blocks:
+    """The structure with every scalar block real: for parameters that are constants, such as a mass."""
+    return [(-abs(r), 0) if c == 0 or (r, c) == (1, 1) else (r, c) for r, c in blocks]
+
+
 def shape(blocks: Sequence[Block]) -> tuple[int, int]:
     """(outputs, inputs) of a matrix M that closes the loop with these blocks."""
     return blocks[-1].cols.stop, blocks[-1].rows.stop

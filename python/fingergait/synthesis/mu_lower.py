@@ -125,7 +125,8 @@ def _mixed(M: ComplexArray, blocks: Sequence[Block]) -> float:
         closed = np.linalg.solve(loop, np.broadcast_to(M, (len(k), *M.shape)))[:, cols][:, :, rows]
         return np.asarray(np.multiply(k, _complex(np.asarray(closed, dtype=complex), inner, 20)) >= 1.0)
 
-    ceiling = 1.0 / best if best > 0.0 else 100.0 / peak
+    # Just short of the k at which the real scalars alone make the loop singular, which would stop the solver.
+    ceiling = min((1.0 - 1e-9) / best, 100.0 / peak) if best > 0.0 else 100.0 / peak
     ks = np.geomspace(1.0 / peak, ceiling, 10)
     works = proven(np.tile(ks, len(v)), np.repeat(MV, len(ks), axis=0)).reshape(len(v), len(ks))
     if not works.any():

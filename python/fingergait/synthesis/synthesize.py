@@ -22,6 +22,7 @@ from .spec import SynthesisSpec
 from .verify import (
     boundary,
     campaign,
+    complex_mu,
     full_mu,
     margins,
     nominal_loop,
@@ -123,6 +124,7 @@ def synthesize(
     say("beyond the uncertainty set")
     certificate = Certificate(
         full=full,
+        complex_peak=complex_mu(spec, shipped),
         per_axis=tuple(by_axis[i].mu[STAGES[-1]].peak for i in range(6)),
         parts=parts(problems(spec, shipped), full[STAGES[-1]].omega, c.delay),
         stability=stability,

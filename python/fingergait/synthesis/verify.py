@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .analysis import MuCurve, Problem, below_nyquist, mu_curve, refined, response
-from .blocks import parse_blocks
+from .blocks import parse_blocks, real_scalars
 from .discretise import DiscreteController
 from .errors import SynthesisError
 from .loop import SampledLoop, delay_margin, gain_margins, join
@@ -67,7 +67,8 @@ def problems(spec: SynthesisSpec, axes: Sequence[StateSpace]) -> list[Problem]:
 def full_mu(spec: SynthesisSpec, stages: dict[str, tuple[list[StateSpace], float]]) -> dict[str, MuCurve]:
     """mu of the coupled six-axis problem at each stage {name: (six controllers, dead time in s)}.
 
-    D-K works axis by axis; this is where the coupling is counted. The lower bound is found at the last stage only.
+    D-K works axis by axis and takes the parameters for complex numbers. This is where the coupling is counted, and that
+    masses, inertias and dampings are real. The lower bound is found at the last stage only.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def full_mu(spec: SynthesisSpec, stages: dict[str, tuple[list[StateSpace], float
     curves: dict[str, MuCurve] = {}
     last = list(stages)[-1]
     for stage, (axes, delay) in stages.items():
-        curves[stage] = mu_curve(problems(spec, axes), spec.omega, delay, lower=stage == last)
+        curves[stage] = mu_curve(problems(spec, axes), spec.omega, delay, real=True, lower=stage == last)
         if curves[stage].peak >= 1.0:
             raise SynthesisError(
                 f"the coupled six-axis problem has mu = {curves[stage].peak:.3f} {stage} at "
@@ -85,6 +86,11 @@ def full_mu(spec: SynthesisSpec, stages: dict[str, tuple[list[StateSpace], float
                 f"of hand.damping and hand.inertia count; lower iteration.gamma or balance sizes between m and rad"
             )
     return curves
+
+
+def complex_mu(spec: SynthesisSpec, axes: Sequence[StateSpace]) -> float:
+    """Peak of mu of the coupled problem if the parameters could be any complex numbers, as D-K iteration takes them."""
+    return mu_curve(problems(spec, axes), spec.omega, spec.control.delay, lower=False).peak
 
 
 def stability_curve(spec: SynthesisSpec, axes: Sequence[StateSpace]) -> MuCurve | None:
@@ -105,7 +111,7 @@ def stability_curve(spec: SynthesisSpec, axes: Sequence[StateSpace]) -> MuCurve 
             wide = replace(body, damping_left=body.damping_left * (centre / damping.centre), damping_error=size)
             n = wide.n_delta
             M = response(replace(problem.plant, body=wide), problem.K, omega, spec.control.delay)[:, :n, :n]
-            real = parse_blocks([(-abs(r), 0) for r, _ in wide.blocks()])
+            real = parse_blocks(real_scalars(wide.blocks()))
             bounds.append(upper_bound(M, real, tolerance=1e-4).value)
         return np.asarray(np.max(bounds, axis=0))
 
