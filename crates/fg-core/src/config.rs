@@ -123,7 +123,7 @@ impl Default for GaitConfig {
             enabled: true,
             w1: 0.99,
             w2: 0.02,
-            w_z: 3.0,
+            w_z: 8.0,
             height_horizon: 0.1,
             plane: QualityPlane::Object,
             q_thres: 0.5,
