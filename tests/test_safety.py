@@ -16,6 +16,7 @@ BITS = {
         "clock late encoder encoder_stuck pose pose_jump pose_stale tactile tactile_lost tactile_stuck".split()
     )
 }
+BITS["motor"] = 1 << 16
 
 FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
     ({"kind": "sensor_nan", "sensor": "encoder", "finger": 1}, "encoder", "hold"),
@@ -33,6 +34,9 @@ FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
     ({"kind": "tactile_stuck", "finger": 0}, "tactile_stuck", "hold"),
     ({"kind": "clock_stall"}, "clock", "hold"),
     ({"kind": "clock_jump", "shift": -5.0}, "clock", "normal"),
+    ({"kind": "finger_power_loss", "finger": 2}, "motor", "hold"),
+    ({"kind": "finger_power_loss", "finger": 1, "joint": 0}, "motor", "hold"),
+    ({"kind": "motor_weak", "scale": 0.5}, None, "normal"),
     ({"kind": "dropped_ticks", "ticks": 5, "every": 50}, "late", "normal"),
 ]
 
@@ -82,3 +86,24 @@ def test_sensors_that_are_fit_raise_no_fault(sensors: dict[str, float]) -> None:
     assert not run.metrics["dropped"]
     assert not run.log["faults"].any()
     assert not run.log["safe_mode"].any()
+
+
+@pytest.mark.parametrize(
+    ("finger", "at", "duration"),
+    # The other three hold, a gait of the finger opposite is under way, the finger itself slides; for ever.
+    [(3, 3.0, 2.0), (2, 5.198, 3.93), (1, 4.871, 2.94), (0, 6.0, 20.0)],
+)
+def test_three_fingers_hold_while_one_has_no_power(finger: int, at: float, duration: float) -> None:
+    fault = {"kind": "finger_power_loss", "finger": finger, "at": at, "duration": duration}
+    run = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 14.0, "fault": [fault]}))
+    assert not run.metrics["dropped"]
+    motor = (run.log["faults"].astype(int) & BITS["motor"]) != 0
+    assert not motor[run.log.t < at].any()
+    assert motor[(run.log.t > at + 1.5) & (run.log.t < at + duration)].all()
+    assert not motor[run.log.t > at + duration + 0.2].any()
+
+
+@pytest.mark.parametrize("name", ["push", "push-hard", "push-at-rest", "noisy", "slippery", "robust-step", "ellipsoid"])
+def test_motors_that_are_fit_are_never_taken_for_dead(name: str) -> None:
+    run = fg.simulate(Scenario.load(name))
+    assert not (run.log["faults"].astype(int) & BITS["motor"]).any()

@@ -95,7 +95,7 @@ fn a_pose_that_stands_still_with_the_object_is_fit() {
     let (still, reference) = replay.recording.rows[700].clone();
     replay.run(0..700, |_, _, _| ());
     replay.run(700..1100, |k, m, r| {
-        *m = Measurement { t: k as f64 / 500.0, ..still.clone() };
+        *m = Measurement { t: k as f64 / 500.0, tau: m.tau.clone(), ..still.clone() };
         *r = reference;
     });
     assert_eq!(replay.mode(), SafeMode::Normal);
@@ -185,6 +185,52 @@ fn a_tactile_sensor_that_is_stuck_is_replaced_by_the_force_commanded() {
         replay.run(BEGIN..BEGIN + 100, |_, m, _| m.tactile[3].f_n = bad);
         assert_eq!(replay.mode(), SafeMode::Hold);
     }
+}
+
+#[test]
+fn a_finger_without_power_is_released_and_comes_back() {
+    for finger in 0..4 {
+        let mut replay = Replay::under_way();
+        let dead = |m: &mut Measurement| m.tau.rows_mut(3 * finger, 3).fill(0.0);
+        replay.run(BEGIN..BEGIN + 4, |_, m, _| dead(m));
+        assert!(!replay.has(Fault::Motor), "a glitch");
+        replay.run(BEGIN + 4..BEGIN + 60, |_, m, _| dead(m));
+        for k in BEGIN + 60..BEGIN + 160 {
+            replay.run(k..k + 1, |_, m, _| dead(m));
+            assert!(replay.has(Fault::Motor));
+            assert_eq!(replay.mode(), SafeMode::Hold);
+            let d = replay.planner.diagnostics();
+            assert_eq!(d.f.rows(3 * finger, 3).amax(), 0.0);
+            assert!(d.tau.rows(3 * finger, 3).amax() < 0.11, "the test and the finger's own weight");
+        }
+        // The fingers that are left carry the weight.
+        assert!(replay.planner.diagnostics().psi.rows(0, 3).norm() < 0.1);
+        replay.run(BEGIN + 160..BEGIN + 200 + RECOVERY, |_, _, _| ());
+        assert!(replay.planner.diagnostics().faults.is_empty());
+        assert_eq!(replay.mode(), SafeMode::Normal);
+        assert!(replay.planner.diagnostics().f[3 * finger + 2] > 0.3);
+    }
+}
+
+#[test]
+fn motors_that_are_weak_or_whose_torque_is_not_known_are_none_without_power() {
+    for spoil in [|m: &mut Measurement| m.tau *= 0.5, |m: &mut Measurement| m.tau.fill(f64::NAN)] {
+        let mut replay = Replay::under_way();
+        for k in BEGIN..BEGIN + 200 {
+            replay.run(k..k + 1, |_, m, _| spoil(m));
+            assert!(!replay.has(Fault::Motor));
+        }
+    }
+}
+
+#[test]
+fn without_any_torque_reading_the_fingers_hold_on() {
+    // Torque sensors that are not there: it cannot be that all fingers have lost their power and still hold.
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 200, |_, m, _| m.tau.fill(0.0));
+    assert!(replay.has(Fault::Motor));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    assert!((0..4).all(|j| replay.planner.diagnostics().f[3 * j + 2] > 0.3));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::clock::{Clock, Tick};
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
 use super::joints::{self, JointGuard};
+use super::motors::MotorGuard;
 use super::odometry::Odometry;
 use super::pose::PoseGuard;
 use super::reference::ReferenceGuard;
@@ -33,6 +34,8 @@ pub enum Course {
 pub struct Plan<'a> {
     /// Contact forces in their contact frames, N.
     pub f: &'a [f64],
+    /// The last command, N m.
+    pub tau: &'a [f64],
     /// Finger that does not hold the object for now.
     pub free: Option<usize>,
     /// Desired joint velocities of the free finger while it slides, rad/s.
@@ -72,6 +75,7 @@ pub struct Guard {
     clock: Clock,
     joints: JointGuard,
     touch: TouchGuard,
+    motors: MotorGuard,
     odometry: Odometry,
     pose: PoseGuard,
     reference: ReferenceGuard,
@@ -93,6 +97,7 @@ impl Guard {
             clock: Clock::new(config, dt),
             joints: JointGuard::new(hand, config, dt),
             touch: TouchGuard::new(hand.n_fingers(), config, contact_force, dt),
+            motors: MotorGuard::new(hand.n_fingers(), hand.n_joints(), config, dt),
             odometry: Odometry::new(hand, dt),
             pose: PoseGuard::new(config, dt),
             reference: ReferenceGuard::new(config, dt),
@@ -113,6 +118,7 @@ impl Guard {
         self.clock.reset();
         self.joints.reset();
         self.touch.reset();
+        self.motors.reset();
         self.odometry.reset();
         self.pose.reset();
         self.reference.reset();
@@ -157,6 +163,16 @@ impl Guard {
     /// False where the joint angles of finger `j` have failed.
     pub fn trusts(&self, j: usize) -> bool {
         self.joints.trusts(j)
+    }
+
+    /// False where finger `j` cannot hold the object: its motors give no torque.
+    pub fn drives(&self, j: usize) -> bool {
+        self.motors.drives(j)
+    }
+
+    /// The torque with which joint `at` is tested for power, N m.
+    pub fn motor_test(&self, at: usize) -> Option<f64> {
+        self.motors.test(at)
     }
 
     /// True where finger `j` is to be let go: its angles have failed, and it feels nothing.
@@ -204,6 +220,10 @@ impl Guard {
             Tick::Blind => self.dt,
             Tick::Step(elapsed) => elapsed,
         };
+        if tick != Tick::Blind {
+            self.motors.admit(plan.tau, measurement.tau.as_slice());
+        }
+        self.faults.insert_if(self.motors.failed(), Fault::Motor);
         self.admit_joints(measurement, elapsed, plan, state);
         state.update(hand, self.trusted.q.as_slice());
         self.admit_touch(measurement, elapsed, plan, hand, state);
@@ -245,11 +265,11 @@ impl Guard {
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
-        let tactile = &self.trusted.tactile;
+        let (tactile, motors) = (&self.trusted.tactile, &self.motors);
         let using = |j: usize| {
             let free = plan.free == Some(j);
             let touching = tactile[j].f_n > 0.0;
-            joints::Use { touching, holding: !free, qd_des: plan.qd_des.filter(|_| free) }
+            joints::Use { touching, holding: !free && motors.drives(j), qd_des: plan.qd_des.filter(|_| free) }
         };
         let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
         let trusted = self.trusted.q.as_mut_slice();
@@ -272,9 +292,11 @@ impl Guard {
         hand: &HandModel,
         state: &HandState,
     ) {
+        let motors = &self.motors;
         let using = |j: usize| {
             let free = plan.free == Some(j);
-            touch::Use { holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            let drives = motors.drives(j);
+            touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
@@ -289,8 +311,8 @@ impl Guard {
         hand: &HandModel,
         state: &HandState,
     ) {
-        let joints = &self.joints;
-        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j);
+        let (joints, motors) = (&self.joints, &self.motors);
+        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j) && motors.drives(j);
         let motion = self.odometry.motion(hand, state, &self.trusted.tactile, sticks);
         let centre = self.odometry.centre(state);
         let X_WO = &measurement.X_WO;
@@ -315,6 +337,7 @@ impl Guard {
             || conditions.solver.confirmed()
             || conditions.saturated.confirmed()
             || self.touch.failed()
+            || self.motors.failed()
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let mut mode = if slow { SafeMode::Hold } else { SafeMode::Normal };

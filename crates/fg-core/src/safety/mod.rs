@@ -9,6 +9,7 @@
 //! | [`clock`] | the time of the measurement |
 //! | [`joints`] | encoders |
 //! | [`touch`] | tactile sensors |
+//! | [`motors`] | motors, by the torques that they give |
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
@@ -23,6 +24,7 @@ pub mod fusion;
 pub mod guard;
 pub mod joints;
 pub mod limiter;
+pub mod motors;
 pub mod odometry;
 pub mod pose;
 pub mod reference;
@@ -61,13 +63,15 @@ pub enum Fault {
     Solver = 13,
     /// Torques have been at their limit, or the wrench undeliverable, for long.
     Saturated = 14,
-    /// A measured joint torque is not finite. The step does not use it.
+    /// A measured joint torque is not finite. Its motor is not judged.
     TorqueSensor = 15,
+    /// A joint is asked for a torque and gives none.
+    Motor = 16,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -84,6 +88,7 @@ impl Fault {
         Self::Solver,
         Self::Saturated,
         Self::TorqueSensor,
+        Self::Motor,
     ];
 
     /// The name used in logs.
@@ -105,6 +110,7 @@ impl Fault {
             Self::Solver => "solver",
             Self::Saturated => "saturated",
             Self::TorqueSensor => "torque_sensor",
+            Self::Motor => "motor",
         }
     }
 }
