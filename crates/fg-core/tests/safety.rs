@@ -130,6 +130,35 @@ fn an_encoder_out_of_range_or_off_holds_with_its_last_angle() {
 }
 
 #[test]
+fn an_angle_that_jumped_is_believed_again_where_it_explains_the_contact() {
+    // The joint turns with the object while its encoder is off, by more than what passes for the last good angle.
+    let (at, end) = (7, 2300);
+    let mut replay = Replay::under_way();
+    let angle = |k: usize| replay.recording.rows[k].0.q[at];
+    assert!((angle(end) - angle(BEGIN)).abs() > 0.1, "{}", angle(end) - angle(BEGIN));
+    replay.run(BEGIN..end, |_, m, _| m.q[at] += 0.4);
+    assert!(replay.has(Fault::Encoder));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    replay.run(end..end + 140, |_, _, _| ());
+    assert!(replay.has(Fault::Encoder), "0.3 s are 150 steps");
+    replay.run(end + 140..end + 160, |_, _, _| ());
+    assert!(!replay.has(Fault::Encoder));
+}
+
+#[test]
+fn an_encoder_that_is_off_for_good_is_never_believed_while_its_finger_touches() {
+    for offset in [0.4, -0.4, 0.25] {
+        for at in 0..12 {
+            let mut replay = Replay::under_way();
+            for k in BEGIN..2200 {
+                replay.run(k..k + 1, |_, m, _| m.q[at] += offset);
+                assert!(replay.has(Fault::Encoder), "joint {at}, {offset} rad, step {k}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_finger_without_angles_or_contact_is_damped() {
     let mut replay = Replay::under_way();
     replay.run(BEGIN..BEGIN + 400, |_, m, _| {

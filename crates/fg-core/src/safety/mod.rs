@@ -13,6 +13,7 @@
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
+//! | [`relearn`] | joint angles that are refused: whether they are right after all |
 //! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
 //! | [`limiter`] | the torque command |
@@ -28,6 +29,7 @@ pub mod motors;
 pub mod odometry;
 pub mod pose;
 pub mod reference;
+pub mod relearn;
 pub mod touch;
 
 /// Something that is not as it should be. The discriminant is the bit in [`Faults::bits`].
