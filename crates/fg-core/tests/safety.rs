@@ -159,6 +159,29 @@ fn an_encoder_that_is_off_for_good_is_never_believed_while_its_finger_touches() 
 }
 
 #[test]
+fn a_finger_that_does_not_find_the_object_holds() {
+    let mut replay = Replay::under_way();
+    // It moves in by several millimetres and feels nothing: it has lost the object.
+    let closed = |k: usize| (2e-3 * k as f64).min(0.3);
+    let lose = |m: &mut Measurement, by: f64| {
+        m.q[0] += by;
+        m.q[2] += by;
+        m.tactile[0].f_n = 0.0;
+    };
+    replay.run(BEGIN..BEGIN + 200, |k, m, _| lose(m, closed(k - BEGIN)));
+    assert!(!replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Normal);
+    assert_eq!(replay.planner.diagnostics().free_finger, Some(0));
+    replay.run(BEGIN + 200..BEGIN + 500, |k, m, _| lose(m, closed(k - BEGIN)));
+    assert!(replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    replay.run(BEGIN + 500..BEGIN + 650, |k, m, _| lose(m, closed(BEGIN + 649 - k)));
+    replay.run(BEGIN + 650..BEGIN + 650 + RECOVERY, |_, _, _| ());
+    assert!(!replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Normal);
+}
+
+#[test]
 fn a_finger_without_angles_or_contact_is_damped() {
     let mut replay = Replay::under_way();
     replay.run(BEGIN..BEGIN + 400, |_, m, _| {

@@ -60,6 +60,8 @@ pub struct SafetyConfig {
     pub motor_time: f64,
     /// What each finger presses more, about, while the pose is not trusted, N.
     pub squeeze_force: f64,
+    /// A finger looks for the object for this long before the object is held where it is, s.
+    pub seek_time: f64,
     /// No finger feels the object for this long: it is gone, s.
     pub contacts_timeout: f64,
     /// Saturation that lasts this long is a fault, s.
@@ -99,6 +101,7 @@ impl Default for SafetyConfig {
             motor_given: 0.03,
             motor_time: 0.01,
             squeeze_force: 1.0,
+            seek_time: 0.5,
             contacts_timeout: 0.05,
             saturation_time: 1.0,
             stop_time: 0.1,
@@ -141,6 +144,7 @@ impl SafetyConfig {
             ("motor_given", self.motor_given, positive, 1e6),
             ("motor_time", self.motor_time, 0.0, 60.0),
             ("squeeze_force", self.squeeze_force, 0.0, 100.0),
+            ("seek_time", self.seek_time, 0.0, 1e3),
             ("contacts_timeout", self.contacts_timeout, 0.0, 60.0),
             ("saturation_time", self.saturation_time, 0.0, 1e3),
             ("stop_time", self.stop_time, positive, 10.0),

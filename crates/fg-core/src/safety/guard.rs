@@ -13,7 +13,7 @@ use super::{Fault, Faults, SafeMode};
 use crate::error::Error;
 use crate::hand::{HandModel, HandState};
 use crate::signals::{Measurement, Reference};
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 
 /// Time constant with which the fingers press harder and let off again, s.
 const SQUEEZE_TIME: f64 = 0.02;
@@ -65,6 +65,7 @@ struct Conditions {
     solver: Debounce,
     saturated: Debounce,
     gone: Debounce,
+    seeking: Debounce,
 }
 
 /// See the module. All memory is allocated in [`Guard::new`].
@@ -333,9 +334,14 @@ impl Guard {
         let gone = plan.grasped && touching < enough;
         let gone = conditions.gone.update(gone, dt, c.contacts_timeout, c.recovery_time);
         self.faults.insert_if(gone, Fault::ContactsLost);
+        let seeks = |j: usize| plan.pressing && self.trusted.tactile[j].f_n <= 0.0 && self.motors.drives(j);
+        let seeking = plan.free.is_some_and(seeks);
+        let seeking = conditions.seeking.update(seeking, dt, c.seek_time, c.recovery_time);
+        self.faults.insert_if(seeking, Fault::FingerLost);
         let slow = conditions.reference.confirmed()
-            || conditions.solver.confirmed()
+            || seeking
             || conditions.saturated.confirmed()
+            || conditions.solver.confirmed()
             || self.touch.failed()
             || self.motors.failed()
             || late
@@ -359,37 +365,5 @@ impl Guard {
             mode = SafeMode::Stop;
         }
         self.mode = mode;
-    }
-}
-
-/// Low-pass of the wrench, for the time when there is no feedback.
-#[derive(Debug, Clone)]
-pub struct SteadyWrench {
-    share: f64,
-    F: Vector6<f64>,
-}
-
-impl SteadyWrench {
-    /// Time constant of the filter, s.
-    const TIME: f64 = 0.2;
-
-    /// A filter at the control period `dt`.
-    pub fn new(dt: f64) -> Self {
-        Self { share: 1.0 - (-dt / Self::TIME).exp(), F: Vector6::zeros() }
-    }
-
-    /// Forgets the past.
-    pub fn reset(&mut self) {
-        self.F = Vector6::zeros();
-    }
-
-    /// Takes this step's wrench.
-    pub fn take(&mut self, F: &Vector6<f64>) {
-        self.F += (F - self.F) * self.share;
-    }
-
-    /// The steady wrench, N and N m.
-    pub fn wrench(&self) -> &Vector6<f64> {
-        &self.F
     }
 }

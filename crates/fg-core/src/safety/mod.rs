@@ -16,6 +16,7 @@
 //! | [`relearn`] | joint angles that are refused: whether they are right after all |
 //! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
+//! | [`steady`] | nothing: the wrench that goes on without feedback |
 //! | [`limiter`] | the torque command |
 
 pub mod clock;
@@ -30,6 +31,7 @@ pub mod odometry;
 pub mod pose;
 pub mod reference;
 pub mod relearn;
+pub mod steady;
 pub mod touch;
 
 /// Something that is not as it should be. The discriminant is the bit in [`Faults::bits`].
@@ -69,11 +71,13 @@ pub enum Fault {
     TorqueSensor = 15,
     /// A joint is asked for a torque and gives none.
     Motor = 16,
+    /// A finger has looked for the object for long.
+    FingerLost = 17,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -91,6 +95,7 @@ impl Fault {
         Self::Saturated,
         Self::TorqueSensor,
         Self::Motor,
+        Self::FingerLost,
     ];
 
     /// The name used in logs.
@@ -113,6 +118,7 @@ impl Fault {
             Self::Saturated => "saturated",
             Self::TorqueSensor => "torque_sensor",
             Self::Motor => "motor",
+            Self::FingerLost => "finger_lost",
         }
     }
 }
