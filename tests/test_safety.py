@@ -16,7 +16,7 @@ BITS = {
         "clock late encoder encoder_stuck pose pose_jump pose_stale tactile tactile_lost tactile_stuck".split()
     )
 }
-BITS["motor"] = 1 << 16
+BITS |= {"reference": 1 << 10, "motor": 1 << 16, "finger_lost": 1 << 17}
 
 FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
     ({"kind": "sensor_nan", "sensor": "encoder", "finger": 1}, "encoder", "hold"),
@@ -28,12 +28,14 @@ FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
     ({"kind": "pose_jump", "shift": [0.0, 0.0, 0.0, 0.0, 0.0, 0.8]}, "pose_jump", "squeeze"),
     ({"kind": "pose_stale"}, "pose_stale", "squeeze"),
     ({"kind": "encoder_stuck", "finger": 0, "joint": 1, "duration": 2.0}, None, "hold"),
+    ({"kind": "encoder_offset", "finger": 2, "joint": 0, "shift": 0.3}, "encoder", "hold"),
     ({"kind": "encoder_range", "finger": 3, "joint": 2}, "encoder", "hold"),
     ({"kind": "tactile_lost", "finger": 1}, "tactile_lost", "hold"),
     ({"kind": "tactile_lost"}, "tactile_lost", "hold"),
     ({"kind": "tactile_stuck", "finger": 0}, "tactile_stuck", "hold"),
     ({"kind": "clock_stall"}, "clock", "hold"),
     ({"kind": "clock_jump", "shift": -5.0}, "clock", "normal"),
+    ({"kind": "reference_nan"}, "reference", "hold"),
     ({"kind": "finger_power_loss", "finger": 2}, "motor", "hold"),
     ({"kind": "finger_power_loss", "finger": 1, "joint": 0}, "motor", "hold"),
     ({"kind": "motor_weak", "scale": 0.5}, None, "normal"),
@@ -107,3 +109,31 @@ def test_three_fingers_hold_while_one_has_no_power(finger: int, at: float, durat
 def test_motors_that_are_fit_are_never_taken_for_dead(name: str) -> None:
     run = fg.simulate(Scenario.load(name))
     assert not (run.log["faults"].astype(int) & BITS["motor"]).any()
+
+
+def test_an_angle_that_was_refused_is_believed_again_once_it_explains_the_contact() -> None:
+    # Angles so alike that their exchange goes unseen; it moves the finger, and at the end the true angles have jumped.
+    fault = {"kind": "joint_order_swapped", "finger": 3, "joint": 0, "other": 2, "at": 2.81, "duration": 0.03}
+    log = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 5.0, "fault": [fault]})).log
+    faults = log["faults"].astype(int)
+    assert np.any(faults[log.t > 2.9] & BITS["encoder"])
+    assert faults[-1] == 0
+    assert log["safe_mode"][-1] == 0
+
+
+def test_an_encoder_that_is_off_for_good_is_refused_for_good() -> None:
+    fault = {"kind": "encoder_offset", "finger": 1, "joint": 2, "shift": -0.3, "at": 3.0}
+    run = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 10.0, "fault": [fault]}))
+    assert not run.metrics["dropped"]
+    after = run.log.t > 3.0
+    assert (run.log["faults"].astype(int)[after] & BITS["encoder"]).all()
+    assert run.log["safe_mode"][-1] == MODES["hold"]
+
+
+def test_the_object_is_held_while_a_finger_looks_for_it() -> None:
+    # Its commands go to the wrong joints for a while, and it ends up off the object.
+    fault = {"kind": "joint_order_swapped", "finger": 2, "joint": 0, "other": 1, "at": 5.897, "duration": 0.25}
+    run = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 15.0, "fault": [fault]}))
+    assert not run.metrics["dropped"]
+    assert np.any(run.log["faults"].astype(int) & BITS["finger_lost"])
+    assert run.log["safe_mode"][-1] == 0
