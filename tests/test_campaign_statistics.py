@@ -71,6 +71,16 @@ def test_a_promise_to_hold_is_broken_by_one_drop() -> None:
     assert claims[-1]["measured"] == "stale" and not claims[-1]["held"]
 
 
+def test_a_promise_to_stop_is_broken_by_another_mode() -> None:
+    rows = rows_of(
+        [
+            {"fault": "gone", "promise": "stop", "status": "dropped", "worst_safe_mode": 4},
+            {"fault": "pulled", "promise": "stop", "status": "dropped", "worst_safe_mode": 1},
+        ]
+    )
+    assert {found.label: found.kept for found in fault_rows(rows)} == {"gone": True, "pulled": False}
+
+
 def test_causes_name_fault_and_limit() -> None:
     lost = {"error": None, "dropped": True, "gaiting_at_end": True, "lost_reason": "x; f1 slid on the object"}
     assert cause(lost, None) == "fingers slid, during a gait"

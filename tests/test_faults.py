@@ -106,6 +106,8 @@ def test_encoders_stick_and_leave_their_range(scene: SceneModel) -> None:
     assert found["q"][2, 0] == clean(1.0).q[2, 0]
     found = differing(scene, kind="encoder_range", finger=2, joint=1, value=-7.0)
     assert found["q"][2, 1] == -7.0
+    found = differing(scene, kind="encoder_offset", finger=1, joint=0, shift=0.3)
+    assert found["q"][1, 0] == clean(1.5).q[1, 0] + 0.3
 
 
 def test_touch_is_lost_or_stands_at_full_scale(scene: SceneModel) -> None:
@@ -152,6 +154,23 @@ def test_friction_halves_and_comes_back(scene: SceneModel) -> None:
         faults.contacts(t)
         seen.append(scene.model.geom(OBJECT).friction[0])
     np.testing.assert_allclose(seen, [1.0, 0.5, 1.0])
+
+
+def test_the_reference_is_spoilt_for_the_controller_alone(scene: SceneModel) -> None:
+    faults = injection(scene, kind="reference_nan")
+    pose, twist = np.ones(7), np.zeros(6)
+    assert (
+        np.isnan(faults.reference(1.5, pose, twist)[0]).all() and np.isnan(faults.reference(1.5, pose, twist)[1]).all()
+    )
+    assert faults.reference(2.5, pose, twist)[0] is pose
+    run = simulate(Scenario.load("hold", {"duration": 0.5, "fault": [{"kind": "reference_nan", "at": 0.2}]}))
+    assert np.isfinite(run.log["desired_x"]).all() and not run.metrics["dropped"]
+
+
+def test_the_object_is_pulled_out_of_the_hand() -> None:
+    fault = {"kind": "object_pulled", "at": 0.3}
+    run = simulate(Scenario.load("hold", {"duration": 1.5, "fault": [fault]}))
+    assert run.metrics["dropped"] and run.log["safe_mode"].max() == 4.0
 
 
 def test_dropped_ticks_hold_the_command_for_longer() -> None:

@@ -63,6 +63,15 @@ class EncoderRange(FaultWindow):
     value: float = 10.0
 
 
+class EncoderOffset(FaultWindow):
+    """One joint's encoder is off by `shift`, rad, as after a slipped gear."""
+
+    kind: Literal["encoder_offset"] = "encoder_offset"
+    finger: Index
+    joint: Index
+    shift: float
+
+
 class TactileLost(FaultWindow):
     """A tactile sensor feels nothing; all of them where `finger` is absent."""
 
@@ -131,12 +140,26 @@ class FrictionDrop(FaultWindow):
     scale: Annotated[float, Field(gt=0.0)] = 0.5
 
 
+class ReferenceNan(FaultWindow):
+    """The reference that the controller is given is NaN."""
+
+    kind: Literal["reference_nan"] = "reference_nan"
+
+
+class ObjectPulled(FaultWindow):
+    """Somebody takes the object away: `force`, N, in W, at the centre of mass."""
+
+    kind: Literal["object_pulled"] = "object_pulled"
+    force: tuple[float, float, float] = (0.0, 0.0, 60.0)
+
+
 Fault = Annotated[
     SensorNan
     | PoseJump
     | PoseStale
     | EncoderStuck
     | EncoderRange
+    | EncoderOffset
     | TactileLost
     | TactileStuck
     | ClockStall
@@ -145,7 +168,9 @@ Fault = Annotated[
     | FingerPowerLoss
     | MotorWeak
     | JointOrderSwapped
-    | FrictionDrop,
+    | FrictionDrop
+    | ReferenceNan
+    | ObjectPulled,
     Field(discriminator="kind"),
 ]
 

@@ -78,6 +78,8 @@ class Injection:
                     q[finger, joint] = self._freeze(number, q[finger, joint])
                 case kinds.EncoderRange(finger=finger, joint=joint, value=value):
                     q[finger, joint] = value
+                case kinds.EncoderOffset(finger=finger, joint=joint, shift=shift):
+                    q[finger, joint] += shift
                 case kinds.TactileLost(finger=finger):
                     place[_which(finger, None)], force[_which(finger, None)] = 0.0, 0.0
                 case kinds.TactileStuck(finger=finger, value=value):
@@ -120,6 +122,17 @@ class Injection:
                 limit[_which(fault.finger, None)] = fault.scale
                 torque = np.clip(torque, -limit.ravel() * self._limits, limit.ravel() * self._limits)
         return torque
+
+    def reference(self, t: float, pose: Array, twist: Array) -> tuple[Array, Array]:
+        """The reference, pose (7,) and twist (6,), that the controller is given at time t."""
+        if any(isinstance(fault, kinds.ReferenceNan) and fault.active(t) for fault in self._faults):
+            return np.full_like(pose, np.nan), np.full_like(twist, np.nan)
+        return pose, twist
+
+    def pull(self, t: float) -> Array | None:
+        """Force (3,), N, in W, at the object's centre of mass at time t; None where there never is any."""
+        pulls = [fault for fault in self._faults if isinstance(fault, kinds.ObjectPulled)]
+        return sum((np.array(p.force) for p in pulls if p.active(t)), np.zeros(3)) if pulls else None
 
     def contacts(self, t: float) -> None:
         """Gives the object the friction that it has at time t."""

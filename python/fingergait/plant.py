@@ -92,6 +92,11 @@ class MujocoPlant:
         if self.scenario.disturbance:
             self._disturb()
         faults.contacts(self.t)
+        pull = faults.pull(self.t)
+        if pull is not None:
+            if not self.scenario.disturbance:  # which starts anew from zero otherwise
+                data.xfrc_applied[self.scene.object_body] = 0.0
+            data.xfrc_applied[self.scene.object_body, :3] += pull
         desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
             motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()

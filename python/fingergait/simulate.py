@@ -78,7 +78,8 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
     cuts = np.cumsum([7, 7, n * m, n, len(plant.sensors.row)]).tolist()
     for k in range(steps):
         pose, twist = trajectory.sample(plant.t)
-        command, diagnostics = planner.step(measurement, _core.Reference(pose, twist))
+        given = plant.injection.reference(plant.t, pose, twist)
+        command, diagnostics = planner.step(measurement, _core.Reference(*given))
         row = log.append(plant.t)
         row[: cuts[0]] = plant.object_pose
         row[cuts[0] : cuts[1]] = pose

@@ -17,8 +17,9 @@ use crate::manipulation::feedforward::damping_torque;
 use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, ForceStatus, SolverUsed};
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
-use crate::safety::guard::{Course, Guard, Plan, SteadyWrench};
+use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
+use crate::safety::steady::SteadyWrench;
 use crate::safety::SafeMode;
 use crate::signals::{Command, Measurement, Reference};
 use crate::spatial::{angular, linear};
@@ -158,6 +159,7 @@ impl DualStagePlanner {
         let phase = self.supervisor.phase();
         let plan = Plan {
             f: self.f_prev.as_slice(),
+            tau: self.command.tau.as_slice(),
             free: self.supervisor.free_finger(),
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
@@ -198,6 +200,7 @@ impl DualStagePlanner {
         self.command.tau += &self.tau_own;
         self.drive_free_finger(measurement);
         self.damp_fingers();
+        self.test_motors();
         let at_limit = self.limiter.apply(&mut self.command.tau);
         self.diagnose(&F_des);
         self.report(at_limit);
@@ -234,7 +237,7 @@ impl DualStagePlanner {
             self.slip.skip();
         }
         let guard = &self.guard;
-        let holds = |j| Some(j) != free && guard.trusts(j);
+        let holds = |j| Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
@@ -325,8 +328,8 @@ impl DualStagePlanner {
     /// Eq. (8), with the free finger's force ramped or taken out.
     fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
-            let damped = self.guard.damps(j);
-            *limit = if damped { 0.0 } else { self.supervisor.force_limit(j, self.config.force.f_n_max) };
+            let holds = self.guard.drives(j) && !self.guard.damps(j);
+            *limit = if holds { self.supervisor.force_limit(j, self.config.force.f_n_max) } else { 0.0 };
             self.f_prev[3 * j + 2] += self.guard.squeeze();
         }
         let scale = self.wrench_scale();

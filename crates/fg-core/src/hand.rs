@@ -251,6 +251,13 @@ impl HandState {
         self.axes[at].cross(&(p_W - self.anchors[at]))
     }
 
+    /// Where the point `p_W` of the last link of finger `j` goes when joint `i` turns by `angle` rad: R(a_i) (p - o_i) + o_i.
+    pub fn turned(&self, j: usize, i: usize, angle: f64, p_W: &Vector3<f64>) -> Vector3<f64> {
+        let at = j * self.n_joints + i;
+        let turn = UnitQuaternion::from_scaled_axis(self.axes[at] * angle);
+        turn * (p_W - self.anchors[at]) + self.anchors[at]
+    }
+
     /// The velocity Jacobian (3, n_joints) in W of the point `p_W` of the last link of finger `j`.
     pub fn jacobian(&self, j: usize, p_W: &Vector3<f64>) -> DMatrix<f64> {
         let columns: Vec<_> = (0..self.n_joints).map(|i| self.jacobian_column(j, i, p_W)).collect();

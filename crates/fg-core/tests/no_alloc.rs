@@ -96,7 +96,40 @@ fn no_step_of_a_failing_run_allocates_in_any_mode() {
         3000.. => measurement.tactile.iter_mut().for_each(|tactile| tactile.f_n = 0.0),
         _ => (),
     });
-    assert_eq!(modes, ["hold", "normal", "squeeze"], "more in tests/safety.rs");
+    assert_eq!(modes, ["hold", "normal", "squeeze"]);
+}
+
+#[test]
+fn no_step_allocates_in_which_a_finger_is_let_go_or_released_for_want_of_power() {
+    let (_, modes) = replay(ROTATE, |k, measurement, _| match k {
+        // A finger that was off the object when its encoders failed.
+        0..1700 => {
+            measurement.tactile[0].f_n = 0.0;
+            if k >= 1500 {
+                measurement.q[0] = f64::NAN;
+            }
+        }
+        2500..2700 => measurement.tau.rows_mut(6, 3).fill(0.0),
+        _ => (),
+    });
+    assert!(modes.contains(&SafeMode::Damp.as_str()), "{modes:?}");
+    assert!(modes.contains(&SafeMode::Hold.as_str()), "{modes:?}");
+}
+
+#[test]
+fn no_step_allocates_once_nothing_is_held() {
+    let (_, modes) = replay(ROTATE, |k, measurement, _| {
+        // The fingers close and feel nothing: the object is gone.
+        if (1500..2500).contains(&k) {
+            let closed = (2e-3 * (k - 1500) as f64).min(0.3);
+            for j in 0..4 {
+                measurement.q[3 * j] += closed;
+                measurement.q[3 * j + 2] += closed;
+                measurement.tactile[j].f_n = 0.0;
+            }
+        }
+    });
+    assert!(modes.contains(&SafeMode::Stop.as_str()), "{modes:?}");
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn a_pose_that_stands_still_with_the_object_is_fit() {
     let (still, reference) = replay.recording.rows[700].clone();
     replay.run(0..700, |_, _, _| ());
     replay.run(700..1100, |k, m, r| {
-        *m = Measurement { t: k as f64 / 500.0, ..still.clone() };
+        *m = Measurement { t: k as f64 / 500.0, tau: m.tau.clone(), ..still.clone() };
         *r = reference;
     });
     assert_eq!(replay.mode(), SafeMode::Normal);
@@ -127,6 +127,58 @@ fn an_encoder_out_of_range_or_off_holds_with_its_last_angle() {
         Replay::under_way().suffers(Fault::Encoder, SafeMode::Hold, 0, |_, m, _| m.q[3] = x);
     }
     Replay::under_way().suffers(Fault::Encoder, SafeMode::Hold, 0, |_, m, _| m.q[2] += 0.5);
+}
+
+#[test]
+fn an_angle_that_jumped_is_believed_again_where_it_explains_the_contact() {
+    // The joint turns with the object while its encoder is off, by more than what passes for the last good angle.
+    let (at, end) = (7, 2300);
+    let mut replay = Replay::under_way();
+    let angle = |k: usize| replay.recording.rows[k].0.q[at];
+    assert!((angle(end) - angle(BEGIN)).abs() > 0.1, "{}", angle(end) - angle(BEGIN));
+    replay.run(BEGIN..end, |_, m, _| m.q[at] += 0.4);
+    assert!(replay.has(Fault::Encoder));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    replay.run(end..end + 140, |_, _, _| ());
+    assert!(replay.has(Fault::Encoder), "0.3 s are 150 steps");
+    replay.run(end + 140..end + 160, |_, _, _| ());
+    assert!(!replay.has(Fault::Encoder));
+}
+
+#[test]
+fn an_encoder_that_is_off_for_good_is_never_believed_while_its_finger_touches() {
+    for offset in [0.4, -0.4, 0.25] {
+        for at in 0..12 {
+            let mut replay = Replay::under_way();
+            for k in BEGIN..2200 {
+                replay.run(k..k + 1, |_, m, _| m.q[at] += offset);
+                assert!(replay.has(Fault::Encoder), "joint {at}, {offset} rad, step {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_finger_that_does_not_find_the_object_holds() {
+    let mut replay = Replay::under_way();
+    // It moves in by several millimetres and feels nothing: it has lost the object.
+    let closed = |k: usize| (2e-3 * k as f64).min(0.3);
+    let lose = |m: &mut Measurement, by: f64| {
+        m.q[0] += by;
+        m.q[2] += by;
+        m.tactile[0].f_n = 0.0;
+    };
+    replay.run(BEGIN..BEGIN + 200, |k, m, _| lose(m, closed(k - BEGIN)));
+    assert!(!replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Normal);
+    assert_eq!(replay.planner.diagnostics().free_finger, Some(0));
+    replay.run(BEGIN + 200..BEGIN + 500, |k, m, _| lose(m, closed(k - BEGIN)));
+    assert!(replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    replay.run(BEGIN + 500..BEGIN + 650, |k, m, _| lose(m, closed(BEGIN + 649 - k)));
+    replay.run(BEGIN + 650..BEGIN + 650 + RECOVERY, |_, _, _| ());
+    assert!(!replay.has(Fault::FingerLost));
+    assert_eq!(replay.mode(), SafeMode::Normal);
 }
 
 #[test]
@@ -185,6 +237,52 @@ fn a_tactile_sensor_that_is_stuck_is_replaced_by_the_force_commanded() {
         replay.run(BEGIN..BEGIN + 100, |_, m, _| m.tactile[3].f_n = bad);
         assert_eq!(replay.mode(), SafeMode::Hold);
     }
+}
+
+#[test]
+fn a_finger_without_power_is_released_and_comes_back() {
+    for finger in 0..4 {
+        let mut replay = Replay::under_way();
+        let dead = |m: &mut Measurement| m.tau.rows_mut(3 * finger, 3).fill(0.0);
+        replay.run(BEGIN..BEGIN + 4, |_, m, _| dead(m));
+        assert!(!replay.has(Fault::Motor), "a glitch");
+        replay.run(BEGIN + 4..BEGIN + 60, |_, m, _| dead(m));
+        for k in BEGIN + 60..BEGIN + 160 {
+            replay.run(k..k + 1, |_, m, _| dead(m));
+            assert!(replay.has(Fault::Motor));
+            assert_eq!(replay.mode(), SafeMode::Hold);
+            let d = replay.planner.diagnostics();
+            assert_eq!(d.f.rows(3 * finger, 3).amax(), 0.0);
+            assert!(d.tau.rows(3 * finger, 3).amax() < 0.11, "the test and the finger's own weight");
+        }
+        // The fingers that are left carry the weight.
+        assert!(replay.planner.diagnostics().psi.rows(0, 3).norm() < 0.1);
+        replay.run(BEGIN + 160..BEGIN + 200 + RECOVERY, |_, _, _| ());
+        assert!(replay.planner.diagnostics().faults.is_empty());
+        assert_eq!(replay.mode(), SafeMode::Normal);
+        assert!(replay.planner.diagnostics().f[3 * finger + 2] > 0.3);
+    }
+}
+
+#[test]
+fn motors_that_are_weak_or_whose_torque_is_not_known_are_none_without_power() {
+    for spoil in [|m: &mut Measurement| m.tau *= 0.5, |m: &mut Measurement| m.tau.fill(f64::NAN)] {
+        let mut replay = Replay::under_way();
+        for k in BEGIN..BEGIN + 200 {
+            replay.run(k..k + 1, |_, m, _| spoil(m));
+            assert!(!replay.has(Fault::Motor));
+        }
+    }
+}
+
+#[test]
+fn without_any_torque_reading_the_fingers_hold_on() {
+    // Torque sensors that are not there: it cannot be that all fingers have lost their power and still hold.
+    let mut replay = Replay::under_way();
+    replay.run(BEGIN..BEGIN + 200, |_, m, _| m.tau.fill(0.0));
+    assert!(replay.has(Fault::Motor));
+    assert_eq!(replay.mode(), SafeMode::Hold);
+    assert!((0..4).all(|j| replay.planner.diagnostics().f[3 * j + 2] > 0.3));
 }
 
 #[test]

@@ -30,7 +30,7 @@ class Limits(Table):
     position_error_p99, orientation_error_p99
         99th percentile over the runs of the run's largest error, m and rad.
     promises
-        Whether every fault with the promise "hold" must leave the object in the hand.
+        Whether every fault with the promise "hold" must leave the object in the hand, and each with "stop" lead to it.
     """
 
     drop_rate: NonNegative | None = None

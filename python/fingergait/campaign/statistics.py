@@ -11,6 +11,8 @@ from scipy.stats import norm
 
 from fingergait.campaign.spec import Limits
 
+STOP = 4
+"""The safe mode in which nothing is held."""
 PAPER_POSITION = 3.7e-3
 """Largest position error that the paper reports of a single run, m."""
 PAPER_ORIENTATION = 0.027
@@ -45,7 +47,7 @@ class FaultRow:
     """What came of one kind of fault.
 
     `gaiting`: runs and drops where it began during a gait; `seen`: runs in which the core's guard noticed something,
-    and the median time that it took, s.
+    and the median time that it took, s; `unstopped`: runs in which the mode was never stop.
     """
 
     label: str
@@ -56,12 +58,13 @@ class FaultRow:
     gaiting: tuple[int, int]
     seen: tuple[int, float | None]
     bad_commands: int
+    unstopped: int = 0
 
     @property
     def kept(self) -> bool:
         """Whether the promise was kept in every run; commands within their limits are part of each."""
         held = self.errors == 0 and self.bad_commands == 0
-        return held and (self.promise != "hold" or self.drops == 0)
+        return held and {"hold": self.drops, "stop": self.unstopped}.get(self.promise, 0) == 0
 
 
 def column(rows: pa.Table, name: str) -> NDArray[np.float64]:
@@ -127,7 +130,7 @@ def claims(rows: pa.Table, figures: dict[str, Any], limits: Limits) -> list[Clai
 
 def fault_rows(rows: pa.Table) -> list[FaultRow]:
     """One row a kind of fault, in alphabetical order."""
-    columns = ("fault", "promise", "status", "gaiting_at_fault", "detected_after_s", "bad_commands")
+    columns = ("fault", "promise", "status", "gaiting_at_fault", "detected_after_s", "bad_commands", "worst_safe_mode")
     records = rows.select(list(columns)).to_pylist()
     labels = sorted({record["fault"] for record in records if record["fault"] is not None})
     found = []
@@ -145,6 +148,7 @@ def fault_rows(rows: pa.Table) -> list[FaultRow]:
                 (len(gaiting), sum(record["status"] == "dropped" for record in gaiting)),
                 (len(seen), float(np.median(seen)) if seen else None),
                 sum(record["bad_commands"] or 0 for record in own),
+                sum(record["worst_safe_mode"] != STOP for record in own),
             )
         )
     return found

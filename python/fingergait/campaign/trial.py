@@ -45,15 +45,16 @@ OBSERVED: dict[str, type] = {
     "gaiting_at_end": bool,
     "gaiting_at_fault": bool,
     "worst_safe_mode": int,
+    "last_safe_mode": int,
     "detected_after_s": float,
     "bad_commands": int,
     "max_torque_share": float,
     "max_torque_rate_share": float,
 }
 """Figures that a campaign adds: true mass and principal moments, kg m^2; from the log, whether a finger was free at the
-end and as the fault began; the most severe mode of the core's guard, and when after the fault's beginning it first saw
-one; commands that were not finite or outside their limits; largest command and largest change of it in one step as
-shares of their limits."""
+end and as the fault began; the most severe mode of the core's guard and the last one, and when after the fault's
+beginning it first saw one; commands that were not finite or outside their limits; largest command and largest change of
+it in one step as shares of their limits."""
 
 _ROUNDING = 1e-5  # relative: a log holds single precision
 
@@ -129,6 +130,7 @@ def observed(log: Log, scenario: Scenario) -> dict[str, Any]:
         "gaiting_at_end": bool(free[-1] >= 0.0),
         "gaiting_at_fault": None if begun is None or begun >= len(free) else bool(free[begun] >= 0.0),
         "worst_safe_mode": None if modes is None else int(modes.max()),
+        "last_safe_mode": None if modes is None else int(modes[-1]),
         "detected_after_s": None if begun is None or first is None else float(log.t[begun + first] - log.t[begun]),
         **command_figures(log, scenario),
     }

@@ -75,6 +75,16 @@ impl DualStagePlanner {
         }
     }
 
+    /// Leaves fingers without power to their own weight, and tests their motors.
+    pub(super) fn test_motors(&mut self) {
+        let n_joints = self.hand.n_joints();
+        for at in 0..self.command.tau.len() {
+            if !self.guard.drives(at / n_joints) {
+                self.command.tau[at] = self.guard.motor_test(at).unwrap_or(self.tau_own[at]);
+            }
+        }
+    }
+
     /// Moves torque `at` towards the finger's own weight and motion.
     fn fade(&mut self, at: usize) {
         let own = self.tau_own[at];

@@ -52,8 +52,16 @@ pub struct SafetyConfig {
     pub lost_distance: f64,
     /// ... and its sensor when it has not after this time, s.
     pub lost_time: f64,
+    /// A motor is dead when its joint, asked for more torque than this, N m ...
+    pub motor_asked: f64,
+    /// ... gives less than this, N m ...
+    pub motor_given: f64,
+    /// ... for this long, s.
+    pub motor_time: f64,
     /// What each finger presses more, about, while the pose is not trusted, N.
     pub squeeze_force: f64,
+    /// A finger looks for the object for this long before the object is held where it is, s.
+    pub seek_time: f64,
     /// No finger feels the object for this long: it is gone, s.
     pub contacts_timeout: f64,
     /// Saturation that lasts this long is a fault, s.
@@ -89,7 +97,11 @@ impl Default for SafetyConfig {
             loaded_force: 0.3,
             lost_distance: 2e-3,
             lost_time: 0.05,
+            motor_asked: 0.08,
+            motor_given: 0.03,
+            motor_time: 0.01,
             squeeze_force: 1.0,
+            seek_time: 0.5,
             contacts_timeout: 0.05,
             saturation_time: 1.0,
             stop_time: 0.1,
@@ -128,7 +140,11 @@ impl SafetyConfig {
             ("loaded_force", self.loaded_force, 0.0, 1e3),
             ("lost_distance", self.lost_distance, positive, 1.0),
             ("lost_time", self.lost_time, 0.0, 60.0),
+            ("motor_asked", self.motor_asked, self.motor_given, 1e6),
+            ("motor_given", self.motor_given, positive, 1e6),
+            ("motor_time", self.motor_time, 0.0, 60.0),
             ("squeeze_force", self.squeeze_force, 0.0, 100.0),
+            ("seek_time", self.seek_time, 0.0, 1e3),
             ("contacts_timeout", self.contacts_timeout, 0.0, 60.0),
             ("saturation_time", self.saturation_time, 0.0, 1e3),
             ("stop_time", self.stop_time, positive, 10.0),

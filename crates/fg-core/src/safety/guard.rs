@@ -4,6 +4,7 @@ use super::clock::{Clock, Tick};
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
 use super::joints::{self, JointGuard};
+use super::motors::MotorGuard;
 use super::odometry::Odometry;
 use super::pose::PoseGuard;
 use super::reference::ReferenceGuard;
@@ -12,7 +13,7 @@ use super::{Fault, Faults, SafeMode};
 use crate::error::Error;
 use crate::hand::{HandModel, HandState};
 use crate::signals::{Measurement, Reference};
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Isometry3;
 
 /// Time constant with which the fingers press harder and let off again, s.
 const SQUEEZE_TIME: f64 = 0.02;
@@ -33,6 +34,8 @@ pub enum Course {
 pub struct Plan<'a> {
     /// Contact forces in their contact frames, N.
     pub f: &'a [f64],
+    /// The last command, N m.
+    pub tau: &'a [f64],
     /// Finger that does not hold the object for now.
     pub free: Option<usize>,
     /// Desired joint velocities of the free finger while it slides, rad/s.
@@ -62,6 +65,7 @@ struct Conditions {
     solver: Debounce,
     saturated: Debounce,
     gone: Debounce,
+    seeking: Debounce,
 }
 
 /// See the module. All memory is allocated in [`Guard::new`].
@@ -72,6 +76,7 @@ pub struct Guard {
     clock: Clock,
     joints: JointGuard,
     touch: TouchGuard,
+    motors: MotorGuard,
     odometry: Odometry,
     pose: PoseGuard,
     reference: ReferenceGuard,
@@ -93,6 +98,7 @@ impl Guard {
             clock: Clock::new(config, dt),
             joints: JointGuard::new(hand, config, dt),
             touch: TouchGuard::new(hand.n_fingers(), config, contact_force, dt),
+            motors: MotorGuard::new(hand.n_fingers(), hand.n_joints(), config, dt),
             odometry: Odometry::new(hand, dt),
             pose: PoseGuard::new(config, dt),
             reference: ReferenceGuard::new(config, dt),
@@ -113,6 +119,7 @@ impl Guard {
         self.clock.reset();
         self.joints.reset();
         self.touch.reset();
+        self.motors.reset();
         self.odometry.reset();
         self.pose.reset();
         self.reference.reset();
@@ -157,6 +164,16 @@ impl Guard {
     /// False where the joint angles of finger `j` have failed.
     pub fn trusts(&self, j: usize) -> bool {
         self.joints.trusts(j)
+    }
+
+    /// False where finger `j` cannot hold the object: its motors give no torque.
+    pub fn drives(&self, j: usize) -> bool {
+        self.motors.drives(j)
+    }
+
+    /// The torque with which joint `at` is tested for power, N m.
+    pub fn motor_test(&self, at: usize) -> Option<f64> {
+        self.motors.test(at)
     }
 
     /// True where finger `j` is to be let go: its angles have failed, and it feels nothing.
@@ -204,6 +221,10 @@ impl Guard {
             Tick::Blind => self.dt,
             Tick::Step(elapsed) => elapsed,
         };
+        if tick != Tick::Blind {
+            self.motors.admit(plan.tau, measurement.tau.as_slice());
+        }
+        self.faults.insert_if(self.motors.failed(), Fault::Motor);
         self.admit_joints(measurement, elapsed, plan, state);
         state.update(hand, self.trusted.q.as_slice());
         self.admit_touch(measurement, elapsed, plan, hand, state);
@@ -245,11 +266,11 @@ impl Guard {
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
-        let tactile = &self.trusted.tactile;
+        let (tactile, motors) = (&self.trusted.tactile, &self.motors);
         let using = |j: usize| {
             let free = plan.free == Some(j);
             let touching = tactile[j].f_n > 0.0;
-            joints::Use { touching, holding: !free, qd_des: plan.qd_des.filter(|_| free) }
+            joints::Use { touching, holding: !free && motors.drives(j), qd_des: plan.qd_des.filter(|_| free) }
         };
         let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
         let trusted = self.trusted.q.as_mut_slice();
@@ -272,9 +293,11 @@ impl Guard {
         hand: &HandModel,
         state: &HandState,
     ) {
+        let motors = &self.motors;
         let using = |j: usize| {
             let free = plan.free == Some(j);
-            touch::Use { holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            let drives = motors.drives(j);
+            touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
@@ -289,8 +312,8 @@ impl Guard {
         hand: &HandModel,
         state: &HandState,
     ) {
-        let joints = &self.joints;
-        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j);
+        let (joints, motors) = (&self.joints, &self.motors);
+        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j) && motors.drives(j);
         let motion = self.odometry.motion(hand, state, &self.trusted.tactile, sticks);
         let centre = self.odometry.centre(state);
         let X_WO = &measurement.X_WO;
@@ -311,10 +334,16 @@ impl Guard {
         let gone = plan.grasped && touching < enough;
         let gone = conditions.gone.update(gone, dt, c.contacts_timeout, c.recovery_time);
         self.faults.insert_if(gone, Fault::ContactsLost);
+        let seeks = |j: usize| plan.pressing && self.trusted.tactile[j].f_n <= 0.0 && self.motors.drives(j);
+        let seeking = plan.free.is_some_and(seeks);
+        let seeking = conditions.seeking.update(seeking, dt, c.seek_time, c.recovery_time);
+        self.faults.insert_if(seeking, Fault::FingerLost);
         let slow = conditions.reference.confirmed()
-            || conditions.solver.confirmed()
+            || seeking
             || conditions.saturated.confirmed()
+            || conditions.solver.confirmed()
             || self.touch.failed()
+            || self.motors.failed()
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let mut mode = if slow { SafeMode::Hold } else { SafeMode::Normal };
@@ -336,37 +365,5 @@ impl Guard {
             mode = SafeMode::Stop;
         }
         self.mode = mode;
-    }
-}
-
-/// Low-pass of the wrench, for the time when there is no feedback.
-#[derive(Debug, Clone)]
-pub struct SteadyWrench {
-    share: f64,
-    F: Vector6<f64>,
-}
-
-impl SteadyWrench {
-    /// Time constant of the filter, s.
-    const TIME: f64 = 0.2;
-
-    /// A filter at the control period `dt`.
-    pub fn new(dt: f64) -> Self {
-        Self { share: 1.0 - (-dt / Self::TIME).exp(), F: Vector6::zeros() }
-    }
-
-    /// Forgets the past.
-    pub fn reset(&mut self) {
-        self.F = Vector6::zeros();
-    }
-
-    /// Takes this step's wrench.
-    pub fn take(&mut self, F: &Vector6<f64>) {
-        self.F += (F - self.F) * self.share;
-    }
-
-    /// The steady wrench, N and N m.
-    pub fn wrench(&self) -> &Vector6<f64> {
-        &self.F
     }
 }

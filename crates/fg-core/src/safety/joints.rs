@@ -3,6 +3,7 @@
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
 use super::odometry::Odometry;
+use super::relearn::Refused;
 use super::{Fault, Faults};
 use crate::hand::{HandModel, HandState};
 
@@ -44,6 +45,7 @@ pub struct JointGuard {
     joints: Vec<Joint>,
     /// For each finger, whether its kinematics have failed for long enough.
     failed: Vec<Debounce>,
+    refused: Vec<Refused>,
     samples: u32,
     dt: f64,
 }
@@ -71,6 +73,7 @@ impl JointGuard {
             n_joints,
             joints: limits.map(joint).collect(),
             failed: vec![Debounce::default(); hand.n_fingers()],
+            refused: vec![Refused::default(); hand.n_fingers()],
             samples: 0,
             dt,
         }
@@ -82,6 +85,7 @@ impl JointGuard {
             *joint = Joint::new(joint.lower, joint.upper);
         }
         self.failed.iter_mut().for_each(Debounce::reset);
+        self.refused.iter_mut().for_each(Refused::reset);
         self.samples = 0;
     }
 
@@ -123,6 +127,18 @@ impl JointGuard {
                 let speed = using.qd_des.map_or(0.0, |qd| qd[i]);
                 joint.asked += speed * elapsed;
                 bad |= !joint.take(q[at.start + i], elapsed, settled, using.touching, &self.config);
+            }
+            let held = using.holding && using.touching;
+            if bad {
+                let turns = self.joints[at.clone()].iter().map(Joint::turn);
+                let refused = &mut self.refused[j];
+                if refused.explains(j, turns, held, elapsed, state, odometry) {
+                    self.joints[at.clone()].iter_mut().for_each(Joint::believe);
+                    bad = false;
+                }
+            }
+            if !bad {
+                self.refused[j].none(j, held, elapsed, state, odometry);
             }
             let stuck = self.stuck(j, &using, odometry, state);
             faults.insert_if(bad, Fault::Encoder);
@@ -201,11 +217,21 @@ impl Joint {
         self.odd = if inside || !consistent || touching { 0.0 } else { self.odd + elapsed };
         let good = inside || !settled || !self.known || self.odd > RELEARN;
         if good {
-            self.good = x;
-            self.missing = 0.0;
-            self.odd = 0.0;
-            self.known = true;
+            self.believe();
         }
         good
+    }
+
+    /// Takes the sample for the true angle.
+    fn believe(&mut self) {
+        self.good = self.raw;
+        self.missing = 0.0;
+        self.odd = 0.0;
+        self.known = true;
+    }
+
+    /// What the sample has over the last good angle, rad; None where it cannot be an angle.
+    fn turn(&self) -> Option<f64> {
+        (self.raw >= self.lower && self.raw <= self.upper).then_some(self.raw - self.good)
     }
 }

@@ -9,11 +9,14 @@
 //! | [`clock`] | the time of the measurement |
 //! | [`joints`] | encoders |
 //! | [`touch`] | tactile sensors |
+//! | [`motors`] | motors, by the torques that they give |
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
+//! | [`relearn`] | joint angles that are refused: whether they are right after all |
 //! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
+//! | [`steady`] | nothing: the wrench that goes on without feedback |
 //! | [`limiter`] | the torque command |
 
 pub mod clock;
@@ -23,9 +26,12 @@ pub mod fusion;
 pub mod guard;
 pub mod joints;
 pub mod limiter;
+pub mod motors;
 pub mod odometry;
 pub mod pose;
 pub mod reference;
+pub mod relearn;
+pub mod steady;
 pub mod touch;
 
 /// Something that is not as it should be. The discriminant is the bit in [`Faults::bits`].
@@ -61,13 +67,17 @@ pub enum Fault {
     Solver = 13,
     /// Torques have been at their limit, or the wrench undeliverable, for long.
     Saturated = 14,
-    /// A measured joint torque is not finite. The step does not use it.
+    /// A measured joint torque is not finite. Its motor is not judged.
     TorqueSensor = 15,
+    /// A joint is asked for a torque and gives none.
+    Motor = 16,
+    /// A finger has looked for the object for long.
+    FingerLost = 17,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 18] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -84,6 +94,8 @@ impl Fault {
         Self::Solver,
         Self::Saturated,
         Self::TorqueSensor,
+        Self::Motor,
+        Self::FingerLost,
     ];
 
     /// The name used in logs.
@@ -105,6 +117,8 @@ impl Fault {
             Self::Solver => "solver",
             Self::Saturated => "saturated",
             Self::TorqueSensor => "torque_sensor",
+            Self::Motor => "motor",
+            Self::FingerLost => "finger_lost",
         }
     }
 }

@@ -115,6 +115,16 @@ impl Odometry {
         self.tips[j].drift
     }
 
+    /// The pose of the object in the last step.
+    pub fn pose(&self) -> Option<&Isometry3<f64>> {
+        self.X_WO.as_ref()
+    }
+
+    /// True where finger `j` stuck to the object in the last step.
+    pub fn sticks(&self, j: usize) -> bool {
+        self.tips[j].sticks
+    }
+
     /// The contact of finger `j` in W while it sticks, m.
     pub fn contact(&self, j: usize) -> &Vector3<f64> {
         &self.tips[j].now

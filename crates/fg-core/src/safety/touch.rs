@@ -17,6 +17,8 @@ const ON_ITS_WAY: f64 = 1e-3;
 /// What the last step knew about one finger.
 #[derive(Debug, Clone, Copy)]
 pub struct Use {
+    /// False where the finger's motors give no torque: it lies where it lies.
+    pub drives: bool,
     /// True where the force optimiser gives the finger its force.
     pub holding: bool,
     /// True where the finger looks for the surface.
@@ -191,8 +193,9 @@ impl Tip {
         c: &SafetyConfig,
         elapsed: f64,
     ) -> bool {
-        if reading.f_n > threshold {
+        if reading.f_n > threshold || !using.drives {
             self.gone = false;
+            self.pressing = None;
             return false;
         }
         if using.pressing && self.replaced.is_none() && self.good.is_some() {

@@ -49,7 +49,7 @@ impl Replay {
         self.planner.diagnostics().faults.contains(fault)
     }
 
-    /// Steps through part of the run with the fault `spoil(k, ..)`.
+    /// Steps through part of the run with the fault `spoil(k, ..)`. The motors give the torques that were commanded.
     pub fn run(
         &mut self,
         steps: Range<usize>,
@@ -57,6 +57,8 @@ impl Replay {
     ) -> &mut Self {
         for k in steps {
             let (mut measurement, mut reference) = self.recording.rows[k].clone();
+            // Motors that do as they are told: with a fault the command is not the recorded one.
+            measurement.tau.copy_from(&self.tau);
             spoil(k, &mut measurement, &mut reference);
             let tau = self.planner.step(&measurement, &reference).unwrap().tau.clone();
             let config = self.planner.config();
