@@ -53,7 +53,7 @@ def test_the_gravity_mismatch_is_compensated_within_half_a_second(mass: float) -
 
 
 def test_without_the_planner_the_object_is_lost_before_half_a_turn() -> None:
-    lost = run("lift-and-rotate", gait__enabled=False, duration=20.0)
+    lost = run("lift-and-rotate", gait__enabled=False)
     assert not lost.kept
     assert lost.turned < np.pi
 

@@ -16,7 +16,7 @@ BITS = {
         "clock late encoder encoder_stuck pose pose_jump pose_stale tactile tactile_lost tactile_stuck".split()
     )
 }
-BITS |= {"reference": 1 << 10, "motor": 1 << 16, "finger_lost": 1 << 17}
+BITS |= {"reference": 1 << 10, "motor": 1 << 16, "finger_lost": 1 << 17, "overdue": 1 << 18}
 
 FAULTS: list[tuple[dict[str, Any], str | None, str]] = [
     ({"kind": "sensor_nan", "sensor": "encoder", "finger": 1}, "encoder", "hold"),
@@ -137,3 +137,12 @@ def test_the_object_is_held_while_a_finger_looks_for_it() -> None:
     assert not run.metrics["dropped"]
     assert np.any(run.log["faults"].astype(int) & BITS["finger_lost"])
     assert run.log["safe_mode"][-1] == 0
+
+
+@pytest.mark.parametrize("seed", [5, 9])
+def test_the_object_is_held_where_no_finger_can_be_spared(seed: int) -> None:
+    # 0.6 kg at friction 0.4: three fingers cannot carry it, and turning on with four would lose it.
+    overrides = {"seed": seed, "truth": {"friction": 0.4, "mass_scale": 1.2}}
+    run = fg.simulate(Scenario.load("slippery", overrides))
+    assert not run.metrics["dropped"]
+    assert np.any(run.log["faults"].astype(int) & BITS["overdue"])

@@ -25,8 +25,9 @@ class LossMonitor:
     Parameters
     ----------
     scenario
-        Its reference step, which for two seconds is no error. With faults, which may stop the reference inside the
-        controller, only a tilt of the object's axis counts as an error of orientation.
+        Its reference step, which for two seconds is no error. With faults, and once the controller has left its normal
+        mode, the reference may stand inside the controller: then only a tilt of the object's axis counts as an error of
+        orientation.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -37,8 +38,12 @@ class LossMonitor:
         self._since: float | None = None
         self.symptom = ""
 
-    def update(self, t: float, true: Array, desired: Array, normal_forces: Array) -> bool:
-        """True once the object is lost, from the poses (7,) and the fingertips' normal forces, N."""
+    def update(self, t: float, true: Array, desired: Array, normal_forces: Array, standing: bool = False) -> bool:
+        """True once the object is lost, from the poses (7,) and the fingertips' normal forces, N.
+
+        `standing`: the controller lets the reference stand in this step.
+        """
+        self._tilt_only |= standing
         symptom = self._symptom(t, true.tolist(), desired.tolist(), normal_forces)
         if symptom is None:
             self._since = None

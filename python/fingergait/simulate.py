@@ -89,9 +89,11 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         row[cuts[4] :] = diagnostics.row()
         step_ns[k] = diagnostics.step_ns
         solver[diagnostics.solver] += 1
-        if k % _CHECK_EVERY == 0 and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force):
-            lost = reason(log, scene, monitor.symptom)
-            break
+        if k % _CHECK_EVERY == 0:
+            standing = diagnostics.safe_mode != "normal"
+            if monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
+                lost = reason(log, scene, monitor.symptom)
+                break
         if watch is not None and k % watch_every == 0 and watch(plant, log):
             break
         if plant.t >= scenario.duration - 1.5 * scenario.period:

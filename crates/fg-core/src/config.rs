@@ -113,6 +113,11 @@ pub struct GaitConfig {
     pub slack_torque: f64,
     /// A gait is broken off when the slack exceeds this multiple of the two limits above.
     pub abort_factor: f64,
+    /// The desired motion stands where Q is below its threshold by more than this ... Deviation: not in the paper, where
+    /// the object turns on though no finger can be freed.
+    pub overdue_margin: f64,
+    /// ... and no finger could be freed for this long, s.
+    pub overdue_time: f64,
     /// Normal force below which a tactile reading counts as no contact, N.
     pub contact_force: f64,
 }
@@ -146,6 +151,8 @@ impl Default for GaitConfig {
             slack_force: 0.4,
             slack_torque: 0.0125,
             abort_factor: 4.0,
+            overdue_margin: 1.5e-3,
+            overdue_time: 0.3,
             contact_force: 0.01,
         }
     }
@@ -295,6 +302,8 @@ impl Config {
             ("gait.slack_force", g.slack_force, 0.0, 1e3),
             ("gait.slack_torque", g.slack_torque, 0.0, 1e3),
             ("gait.abort_factor", g.abort_factor, 1.0, 1e6),
+            ("gait.overdue_margin", g.overdue_margin, 0.0, 1e6),
+            ("gait.overdue_time", g.overdue_time, 0.0, 1e6),
             ("gait.contact_force", g.contact_force, 0.0, 10.0),
             ("force.alpha1", f.alpha1, 1e-9, 1e9),
             ("force.alpha2", f.alpha2, 0.0, 1e9),

@@ -20,7 +20,6 @@ use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
 use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
 use crate::safety::steady::SteadyWrench;
-use crate::safety::SafeMode;
 use crate::signals::{Command, Measurement, Reference};
 use crate::spatial::{angular, linear};
 use nalgebra::{DMatrix, DVector, Vector6};
@@ -182,7 +181,7 @@ impl DualStagePlanner {
     /// The step on a measurement that can be used.
     fn run(&mut self, measurement: &Measurement, reference: &Reference) {
         self.grasp.update(&self.hand, &self.state, measurement);
-        if self.guard.mode() != SafeMode::Normal {
+        if !self.guard.gaits() {
             self.supervisor.abort();
         }
         self.supervise(measurement);
@@ -190,7 +189,7 @@ impl DualStagePlanner {
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
-        if self.guard.mode() == SafeMode::Normal {
+        if self.guard.gaits() {
             self.choose_finger(measurement, &F_des);
         }
         self.optimise_forces(&F_des);

@@ -79,6 +79,10 @@ pub struct Supervisor {
     threshold: Option<f64>,
     refused: Vec<bool>,
     since_refusal: f64,
+    /// Time for which the event has asked for a gait in vain, s.
+    waiting: f64,
+    /// How far Q was below its threshold when the event last asked.
+    deficit: f64,
     end: GaitEnd,
     gaits: u64,
 }
@@ -99,6 +103,8 @@ impl Supervisor {
             threshold: None,
             refused: vec![false; n],
             since_refusal: 0.0,
+            waiting: 0.0,
+            deficit: 0.0,
             end: GaitEnd::None,
             gaits: 0,
         }
@@ -111,6 +117,7 @@ impl Supervisor {
         self.off.fill(0.0);
         self.threshold = None;
         self.refused.fill(false);
+        self.waiting = 0.0;
         self.end = GaitEnd::None;
         self.gaits = 0;
     }
@@ -170,7 +177,7 @@ impl Supervisor {
     /// The candidate has small manipulability and leaves a large remaining grasp; fingers that were refused a moment ago
     /// are passed over. `promises(k)` says whether freeing finger k can raise Q at all.
     pub fn candidate(
-        &self,
+        &mut self,
         now: &Quality,
         quality: &QualityModel,
         scene: &Scene<'_>,
@@ -181,8 +188,11 @@ impl Supervisor {
             && self.touching >= STATIC_AFTER
             && self.threshold.is_some_and(|threshold| now.Q < threshold);
         if !event {
+            self.waiting = 0.0;
             return None;
         }
+        self.waiting += self.dt;
+        self.deficit = self.threshold.map_or(0.0, |threshold| threshold - now.Q);
         let score = |k: usize| {
             self.config.w1 * quality.remaining_quality(scene, k)
                 - self.config.w2 * quality.manipulability(k, scene.q)
@@ -197,11 +207,17 @@ impl Supervisor {
         best.map(|(k, _)| k)
     }
 
+    /// True where the grasp has grown bad and no finger could be freed for some time: turning on would lose the object.
+    pub fn overdue(&self) -> bool {
+        self.waiting > self.config.overdue_time && self.deficit > self.config.overdue_margin
+    }
+
     /// Starts the gait of finger `k`.
     pub fn start(&mut self, k: usize, grasp: &Grasp) {
         self.free = k;
         self.f_start = grasp.contact(k).f_n;
         self.gaits += 1;
+        self.waiting = 0.0;
         self.enter(Phase::Unload);
     }
 

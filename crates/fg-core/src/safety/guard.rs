@@ -48,6 +48,7 @@ pub struct Plan<'a> {
 
 /// How the control step went.
 #[derive(Debug, Clone, Copy, Default)]
+#[allow(clippy::struct_excessive_bools)] // four facts that do not depend on each other
 pub struct Outcome {
     /// The contact forces are certified.
     pub solved: bool,
@@ -55,6 +56,8 @@ pub struct Outcome {
     pub box_empty: bool,
     /// A torque is at its limit, or the wrench is not delivered.
     pub saturated: bool,
+    /// The grasp has grown bad, and no finger can be freed.
+    pub overdue: bool,
 }
 
 /// Conditions of the whole step that must last before they count.
@@ -64,6 +67,7 @@ struct Conditions {
     reference: Debounce,
     solver: Debounce,
     saturated: Debounce,
+    overdue: Debounce,
     gone: Debounce,
     seeking: Debounce,
 }
@@ -83,6 +87,8 @@ pub struct Guard {
     conditions: Conditions,
     faults: Faults,
     mode: SafeMode,
+    /// Gaits may begin and go on.
+    gaits: bool,
     /// No feedback in this step.
     blind: bool,
     squeeze: f64,
@@ -105,6 +111,7 @@ impl Guard {
             conditions: Conditions::default(),
             faults: Faults::default(),
             mode: SafeMode::Normal,
+            gaits: true,
             blind: false,
             squeeze: 0.0,
             damped: vec![false; hand.n_fingers()],
@@ -126,6 +133,7 @@ impl Guard {
         self.conditions = Conditions::default();
         self.faults = Faults::default();
         self.mode = SafeMode::Normal;
+        self.gaits = true;
         self.blind = false;
         self.squeeze = 0.0;
         self.damped.fill(false);
@@ -139,6 +147,11 @@ impl Guard {
     /// The mode of this step.
     pub fn mode(&self) -> SafeMode {
         self.mode
+    }
+
+    /// True where gaits may begin and go on: nothing is wrong but, at most, the grasp itself.
+    pub fn gaits(&self) -> bool {
+        self.gaits
     }
 
     /// True where neither the sensor nor the fingers tell the object's pose: the last wrench is all there is.
@@ -263,6 +276,8 @@ impl Guard {
         let saturated =
             self.conditions.saturated.update(outcome.saturated, dt, c.saturation_time, c.recovery_time);
         self.faults.insert_if(saturated, Fault::Saturated);
+        let overdue = self.conditions.overdue.update(outcome.overdue, dt, 0.0, c.recovery_time);
+        self.faults.insert_if(overdue, Fault::Overdue);
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
@@ -340,13 +355,13 @@ impl Guard {
         self.faults.insert_if(seeking, Fault::FingerLost);
         let slow = conditions.reference.confirmed()
             || seeking
-            || conditions.saturated.confirmed()
             || conditions.solver.confirmed()
             || self.touch.failed()
             || self.motors.failed()
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
-        let mut mode = if slow { SafeMode::Hold } else { SafeMode::Normal };
+        let strained = conditions.saturated.confirmed() || conditions.overdue.confirmed();
+        let mut mode = if slow || strained { SafeMode::Hold } else { SafeMode::Normal };
         if self.blind || self.pose.failed() {
             mode = SafeMode::Squeeze;
         }
@@ -364,6 +379,7 @@ impl Guard {
         if gone || !(self.joints.known() && self.pose.known()) {
             mode = SafeMode::Stop;
         }
+        self.gaits = !slow && mode <= SafeMode::Hold;
         self.mode = mode;
     }
 }

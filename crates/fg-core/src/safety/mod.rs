@@ -73,11 +73,13 @@ pub enum Fault {
     Motor = 16,
     /// A finger has looked for the object for long.
     FingerLost = 17,
+    /// The grasp has grown bad, and no finger can be freed to mend it.
+    Overdue = 18,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -96,6 +98,7 @@ impl Fault {
         Self::TorqueSensor,
         Self::Motor,
         Self::FingerLost,
+        Self::Overdue,
     ];
 
     /// The name used in logs.
@@ -119,6 +122,7 @@ impl Fault {
             Self::TorqueSensor => "torque_sensor",
             Self::Motor => "motor",
             Self::FingerLost => "finger_lost",
+            Self::Overdue => "overdue",
         }
     }
 }
@@ -172,7 +176,8 @@ pub enum SafeMode {
     /// As the paper says.
     #[default]
     Normal,
-    /// The object is held where it is: the reference stands, no gait begins, a sliding finger presses and is loaded.
+    /// The object is held where it is: the reference stands, no gait begins, a sliding finger presses and is loaded. Only
+    /// where the grasp itself is the fault, overdue or saturated, gaits go on: they mend it.
     Hold,
     /// As [`SafeMode::Hold`], pressing harder, on the pose that the fingers tell; without that, with the last wrench.
     Squeeze,
