@@ -357,6 +357,7 @@ impl DualStagePlanner {
             d.status = ForceStatus::Held;
             d.solver = SolverUsed::Held;
         }
+        d.solver_counts = *self.forces.counts();
     }
 
     /// Eqs. (4) and (5) for the finger that slides or presses.
