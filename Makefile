@@ -3,6 +3,8 @@
 # make test    every test
 # make check   formats, lints and types; warnings fail
 # make bench   how long a control step takes
+# make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
+# make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
 # Each starts from a bare checkout.
 
 SHELL := bash
@@ -14,7 +16,7 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench clean
+.PHONY: setup demo test wheel check bench recordings reference clean
 
 setup: .venv/.module
 
@@ -45,6 +47,21 @@ check: setup
 bench: setup
 	cargo bench --workspace --locked
 	$(BIN)/fingergait bench
+
+RECORD := $(BIN)/python -m fingergait.record lift-and-rotate
+RECORDINGS := crates/fg-core/benches/data
+# The sensors that users have: noise, encoders of 12 bits, a pose at 60 Hz that is 30 ms late.
+SENSORS := position_noise=2e-4 orientation_noise=2e-3 contact_place_noise=3e-4 contact_force_noise=0.05 \
+           pose_rate_hz=60 pose_delay_s=0.03 encoder_bits=12
+
+recordings: setup
+	$(RECORD) $(RECORDINGS)/rotate.rec --set duration=6
+	$(RECORD) $(RECORDINGS)/noisy.rec --set duration=6 $(SENSORS:%=--set sensors.%)
+
+reference: setup
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
+	$(BIN)/fingergait bench --out runs/reference
+	cp runs/reference/bench.json models/bench/reference.json
 
 clean:
 	rm -rf .venv target
