@@ -13,10 +13,12 @@
 
 #[path = "../benches/recording/mod.rs"]
 mod recording;
+mod thread_clock;
 
 use recording::{Recording, ROTATE};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use thread_clock::thread_ns;
 
 /// Upper edges of the histogram's classes, microseconds.
 const EDGES: [u64; 12] = [5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, u64::MAX];
@@ -124,14 +126,6 @@ fn lock_memory() -> &'static str {
     } else {
         "locked"
     }
-}
-
-/// Thread CPU time, ns.
-fn thread_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the structure outlives the call.
-    unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-    u64::try_from(time.tv_sec).unwrap_or(0) * 1_000_000_000 + u64::try_from(time.tv_nsec).unwrap_or(0)
 }
 
 /// Resident memory of this process, KiB; zero where the system does not say.
