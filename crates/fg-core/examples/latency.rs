@@ -6,7 +6,8 @@
 //!
 //! A run is replayed N times. The planner is deterministic, so that a step does the same work in every replay: what an
 //! interrupt or another process adds to it differs from replay to replay, and is not in the least of its N times. What is
-//! left in the spread of these least times depends on the data: gaits, changes of the working set, sensors. Both are printed.
+//! left in the spread of these least times depends on the data: gaits, changes of the working set, sensors. Both are printed,
+//! and as many times of a loop that always does the same and takes as long as a step: its tail is the machine's alone.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../benches/recording/mod.rs"]
@@ -43,6 +44,8 @@ fn main() {
             print(&format!("{name} {kind}"), times.least.len(), &mut times.raw);
             print("    least of replays", times.least.len(), &mut times.least);
         }
+        let median = kinds.get_mut("all").map_or(0.0, |times| percentile(&mut times.raw, 0.5));
+        print("    always the same work", 1, &mut same_work(median, steps.len() * repeats));
         let mut order: Vec<usize> = (0..steps.len()).collect();
         order.sort_by_key(|k| std::cmp::Reverse(steps[*k].2));
         print!("    longest:");
@@ -78,6 +81,23 @@ fn replay(recording: &Recording, repeats: usize) -> (Vec<Step>, BTreeMap<&'stati
     all.raw = kinds.values().flat_map(|times| times.raw.iter().copied()).collect();
     kinds.insert("all", all);
     (steps, kinds)
+}
+
+/// `count` times of a loop that takes about `us`, ns.
+fn same_work(us: f64, count: usize) -> Vec<u64> {
+    let time = |turns: u32| {
+        let begin = thread_ns();
+        let mut x = std::hint::black_box(1.0_f64);
+        for _ in 0..turns {
+            x = std::hint::black_box(x * 0.999 + 0.001);
+        }
+        thread_ns() - begin
+    };
+    let least = |turns| (0..100).map(|_| time(turns)).min().unwrap_or(0) as f64 / 1e3;
+    let (short, long) = (least(0), least(1000));
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousands")]
+    let turns = ((us - short) / (long - short).max(1e-3) * 1000.0).max(0.0) as u32;
+    (0..count).map(|_| time(turns)).collect()
 }
 
 fn percentile(ns: &mut [u64], share: f64) -> f64 {
