@@ -5,6 +5,7 @@
 # make bench   how long a control step takes
 # make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
 # make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
+# make daqp    the force QP beside DAQP's C code, in one program; needs a C compiler
 # Each starts from a bare checkout.
 
 SHELL := bash
@@ -16,7 +17,7 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench recordings reference clean
+.PHONY: setup demo test wheel check bench recordings reference daqp clean
 
 setup: .venv/.module
 
@@ -62,6 +63,12 @@ reference: setup
 	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
 	$(BIN)/fingergait bench --out runs/reference
 	cp runs/reference/bench.json models/bench/reference.json
+
+daqp: setup
+	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT; \
+	$(BIN)/pip download --quiet --no-deps --no-binary daqp --dest "$$folder" daqp==0.11.0; \
+	tar -xzf "$$folder"/daqp-0.11.0.tar.gz -C "$$folder"; \
+	DAQP_SOURCE="$$folder/daqp-0.11.0" cargo run --release --locked --quiet --manifest-path crates/fg-core/daqp/Cargo.toml
 
 clean:
 	rm -rf .venv target
