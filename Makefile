@@ -5,6 +5,8 @@
 # make bench   how long a control step takes
 # make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
 # make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
+# make fuzz    the core's steps and parsers on anything at all, under AddressSanitizer; needs a nightly toolchain
+# make miri    the core's unit tests in an interpreter that knows undefined behaviour; needs a nightly toolchain
 # make daqp    the force QP beside DAQP's C code, in one program; needs a C compiler
 # Each starts from a bare checkout.
 
@@ -17,7 +19,7 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench recordings reference daqp clean
+.PHONY: setup demo test wheel check bench recordings reference daqp fuzz miri clean
 
 setup: .venv/.module
 
@@ -63,6 +65,19 @@ reference: setup
 	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
 	$(BIN)/fingergait bench --out runs/reference
 	cp runs/reference/bench.json models/bench/reference.json
+
+# AddressSanitizer is in all three; what they find new stays in target/.
+FUZZ_SECONDS ?= 60
+fuzz:
+	@command -v cargo-fuzz > /dev/null || $(call missing,cargo-fuzz and a nightly toolchain,cargo install cargo-fuzz)
+	cd crates/fg-core && for name in parsers step step_any_config; do \
+	mkdir -p ../../target/fuzz/$$name; \
+	cargo +nightly fuzz run $$name ../../target/fuzz/$$name fuzz/corpus/$$name -- -max_total_time=$(FUZZ_SECONDS); done
+
+# Miri's own sines and cosines differ from call to call unless told not to.
+miri:
+	@cargo +nightly miri --version > /dev/null || $(call missing,miri,rustup component add --toolchain nightly miri rust-src)
+	MIRIFLAGS=-Zmiri-deterministic-floats cargo +nightly miri test --locked --package fg-core --lib
 
 daqp: setup
 	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT; \
