@@ -7,15 +7,17 @@ import fingergait as fg
 from fingergait.pose_error import pose_errors
 
 POSITION, ANGLE, TORQUE = 1e-6, 1e-5, 1e-4
-"""m, rad, N m: what two runs may differ by. Both solvers certify forces to 1e-7 N; contact, and each gait's event, pass a
-difference on through thousands of steps."""
+"""m, rad, N m: what two runs may differ by. Both solvers certify forces to 1e-7 N; contact, and each gait's event, pass
+a difference on through thousands of steps."""
 
 
 def run(name: str, duration: float, solver: str) -> fg.Run:
     return fg.simulate(fg.Scenario.load(name, {"duration": duration, "force.solver": solver}))
 
 
-@pytest.mark.parametrize(("name", "duration", "gaits"), [("lift-and-rotate", 15.0, 8), ("noisy", 10.0, 4), ("push", 12.0, 4)])
+@pytest.mark.parametrize(
+    ("name", "duration", "gaits"), [("lift-and-rotate", 15.0, 8), ("noisy", 10.0, 4), ("push", 12.0, 4)]
+)
 def test_the_fast_path_and_clarabel_give_the_same_trajectory(name: str, duration: float, gaits: int) -> None:
     fast, slow = (run(name, duration, solver) for solver in ("active_set", "clarabel"))
     assert set(fast.metrics["solver"]) == {"active_set"}
