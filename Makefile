@@ -3,6 +3,11 @@
 # make test    every test
 # make check   formats, lints and types; warnings fail
 # make bench   how long a control step takes
+# make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
+# make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
+# make fuzz    the core's steps and parsers on anything at all, under AddressSanitizer; needs a nightly toolchain
+# make miri    the core's unit tests in an interpreter that knows undefined behaviour; needs a nightly toolchain
+# make daqp    the force QP beside DAQP's C code, in one program; needs a C compiler
 # Each starts from a bare checkout.
 
 SHELL := bash
@@ -14,7 +19,7 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench clean
+.PHONY: setup demo test wheel check bench recordings reference daqp fuzz miri clean
 
 setup: .venv/.module
 
@@ -45,6 +50,40 @@ check: setup
 bench: setup
 	cargo bench --workspace --locked
 	$(BIN)/fingergait bench
+
+RECORD := $(BIN)/python -m fingergait.record lift-and-rotate
+RECORDINGS := crates/fg-core/benches/data
+# The sensors that users have: noise, encoders of 12 bits, a pose at 60 Hz that is 30 ms late.
+SENSORS := position_noise=2e-4 orientation_noise=2e-3 contact_place_noise=3e-4 contact_force_noise=0.05 \
+           pose_rate_hz=60 pose_delay_s=0.03 encoder_bits=12
+
+recordings: setup
+	$(RECORD) $(RECORDINGS)/rotate.rec --set duration=6
+	$(RECORD) $(RECORDINGS)/noisy.rec --set duration=6 $(SENSORS:%=--set sensors.%)
+
+reference: setup
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
+	$(BIN)/fingergait bench --out runs/reference
+	cp runs/reference/bench.json models/bench/reference.json
+
+# AddressSanitizer is in all three; what they find new stays in target/.
+FUZZ_SECONDS ?= 60
+fuzz:
+	@command -v cargo-fuzz > /dev/null || $(call missing,cargo-fuzz and a nightly toolchain,cargo install cargo-fuzz)
+	cd crates/fg-core && for name in parsers step step_any_config; do \
+	mkdir -p ../../target/fuzz/$$name; \
+	cargo +nightly fuzz run $$name ../../target/fuzz/$$name fuzz/corpus/$$name -- -max_total_time=$(FUZZ_SECONDS); done
+
+# Miri's own sines and cosines differ from call to call unless told not to.
+miri:
+	@cargo +nightly miri --version > /dev/null || $(call missing,miri,rustup component add --toolchain nightly miri rust-src)
+	MIRIFLAGS=-Zmiri-deterministic-floats cargo +nightly miri test --locked --package fg-core --lib
+
+daqp: setup
+	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT; \
+	$(BIN)/pip download --quiet --no-deps --no-binary daqp --dest "$$folder" daqp==0.11.0; \
+	tar -xzf "$$folder"/daqp-0.11.0.tar.gz -C "$$folder"; \
+	DAQP_SOURCE="$$folder/daqp-0.11.0" cargo run --release --locked --quiet --manifest-path crates/fg-core/daqp/Cargo.toml
 
 clean:
 	rm -rf .venv target

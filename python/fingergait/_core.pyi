@@ -104,6 +104,9 @@ class Diagnostics:
     @property
     def solver(self) -> str: ...
     @property
+    def solver_counts(self) -> dict[str, int]:
+        """Answers of each solver since the start, and how often and why one passed the QP on to the next."""
+    @property
     def safe_mode(self) -> str:
         """How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop"."""
     @property

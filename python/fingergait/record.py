@@ -3,7 +3,11 @@
 A recording is one line of JSON and, behind its line feed, rows of single-precision numbers, little-endian. The line
 has `format`, `scenario`, `hand` (as for `HandModel`), `controller` (the artefact), `config` (of the core, what is not
 default), `fingers`, `joints`, `rate_hz` and `rows`. A row is q, tau, the pose wxyz, the tactile places and forces, then
-the reference's pose and twist.
+the reference's pose and twist, then the torques that were commanded.
+
+The measurements of a recording answer the commands of the controller that was recorded, and of no other: with another
+one in the replay they do not, and K runs away. The commands are there so that a test can tell when it is time to record
+anew (`make recordings`).
 """
 
 import argparse
@@ -20,7 +24,7 @@ from fingergait.reference import Trajectory
 from fingergait.scenario import Scenario, parse_override
 from fingergait.simulate import load_controller
 
-FORMAT = "fingergait-recording/1"
+FORMAT = "fingergait-recording/2"
 
 
 def record(scenario: Scenario, out: Path) -> int:
@@ -34,8 +38,8 @@ def record(scenario: Scenario, out: Path) -> int:
     rows = []
     for _ in range(round((scenario.duration + scenario.grasp.settle) * scenario.controller.rate_hz)):
         pose, twist = trajectory.sample(plant.t)
-        rows.append(np.concatenate([plant.sensors.row, pose, twist]))
         command, _ = planner.step(measurement, _core.Reference(pose, twist))
+        rows.append(np.concatenate([plant.sensors.row, pose, twist, command.tau.ravel()]))
         measurement = plant.step(command)
     plant.close()
     head = {

@@ -6,17 +6,20 @@
 //! ```
 //!
 //! Where permitted it runs under SCHED_FIFO with its memory locked. The histogram counts wall-clock time from the moment a
-//! step was due to the moment its command was ready, so what the operating system does to it is in there; the time that the
-//! step itself took on the processor is given beside it. Exit status 1: deadlines were missed.
+//! step was due to the moment its command was ready, so what the operating system and the hypervisor do to it is in there;
+//! how late the thread was woken, and the time that the step itself took on the processor, are given beside it. Exit status
+//! 1: deadlines were missed.
 #![allow(missing_docs, non_snake_case)]
 #![allow(unsafe_code)] // system calls that the standard library lacks
 
 #[path = "../benches/recording/mod.rs"]
 mod recording;
+mod thread_clock;
 
 use recording::{Recording, ROTATE};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
+use thread_clock::thread_ns;
 
 /// Upper edges of the histogram's classes, microseconds.
 const EDGES: [u64; 12] = [5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, u64::MAX];
@@ -27,17 +30,21 @@ struct Report {
     latency: [u64; EDGES.len()],
     steps: u64,
     missed: u64,
+    /// Of those missed: the thread was woken when its deadline had passed.
+    overslept: u64,
     worst_us: u64,
+    worst_wake_us: u64,
     cpu_ns: u64,
     worst_cpu_ns: u64,
 }
 
 impl Report {
-    fn note(&mut self, late: Duration, cpu_ns: u64) {
+    fn note(&mut self, woken: Duration, late: Duration, cpu_ns: u64) {
         let us = u64::try_from(late.as_micros()).unwrap_or(u64::MAX);
         self.latency[EDGES.iter().position(|edge| us < *edge).unwrap_or(EDGES.len() - 1)] += 1;
         self.steps += 1;
         self.worst_us = self.worst_us.max(us);
+        self.worst_wake_us = self.worst_wake_us.max(u64::try_from(woken.as_micros()).unwrap_or(u64::MAX));
         self.cpu_ns += cpu_ns;
         self.worst_cpu_ns = self.worst_cpu_ns.max(cpu_ns);
     }
@@ -54,6 +61,10 @@ impl Report {
         println!(
             "{steps} steps, {missed} deadlines of {} us missed, worst {worst_us} us",
             period.as_micros()
+        );
+        println!(
+            "woken late: worst {} us; {} of the missed deadlines had passed by then",
+            self.worst_wake_us, self.overslept
         );
         println!(
             "processor time: mean {} ns, worst {} ns",
@@ -84,14 +95,16 @@ fn main() -> ExitCode {
             }
             due += period;
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            let woken = due.elapsed();
             let cpu = thread_ns();
             let outcome = planner.step(measurement, reference);
             assert!(outcome.is_ok_and(|command| command.tau.iter().all(|tau| tau.is_finite())));
             let cpu = thread_ns() - cpu;
             let late = due.elapsed();
-            report.note(late, cpu);
+            report.note(woken, late, cpu);
             if late > period {
                 report.missed += 1;
+                report.overslept += u64::from(woken > period);
                 // Steps that could not be made in time are gone; the next one is due in the future.
                 due += period * u32::try_from(late.as_nanos() / period.as_nanos()).unwrap_or(0);
             }
@@ -124,14 +137,6 @@ fn lock_memory() -> &'static str {
     } else {
         "locked"
     }
-}
-
-/// Thread CPU time, ns.
-fn thread_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the structure outlives the call.
-    unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
-    u64::try_from(time.tv_sec).unwrap_or(0) * 1_000_000_000 + u64::try_from(time.tv_nsec).unwrap_or(0)
 }
 
 /// Resident memory of this process, KiB; zero where the system does not say.

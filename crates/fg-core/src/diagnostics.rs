@@ -4,7 +4,7 @@ use crate::gait::planner::GaitRate;
 use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
 use crate::hand::HandModel;
-use crate::manipulation::force::{ForceStatus, SolverUsed};
+use crate::manipulation::force::{ForceStatus, SolverCounters, SolverUsed};
 use crate::safety::{Faults, SafeMode};
 use nalgebra::{DVector, Vector6};
 
@@ -49,10 +49,14 @@ pub struct Diagnostics {
     pub status: ForceStatus,
     /// Who solved the QP.
     pub solver: SolverUsed,
-    /// KKT residual of the QP.
+    /// KKT residual of the QP, N; certified up to `force.tolerance`, and taken as it is up to 100 times that where rounding
+    /// or an interior point allow no better.
     pub kkt: f64,
     /// Iterations of the QP solver.
     pub iterations: usize,
+    /// Answers of each solver since the start, and how often and why one passed the QP on to the next. Not in the log,
+    /// which has each step's solver and residual.
+    pub solver_counts: SolverCounters,
     /// Friction coefficient that the force optimiser assumes.
     pub friction: f64,
     /// What was wrong with this step's measurement, or with the step itself.
@@ -87,6 +91,7 @@ impl Diagnostics {
             solver: SolverUsed::ActiveSet,
             kkt: 0.0,
             iterations: 0,
+            solver_counts: SolverCounters::default(),
             friction: 0.0,
             faults: Faults::default(),
             safe_mode: SafeMode::Normal,

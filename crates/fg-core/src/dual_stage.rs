@@ -79,6 +79,21 @@ macro_rules! scene {
     };
 }
 
+/// Eq. (8) for the weighted wrench `F`; a macro for the same reason.
+macro_rules! force_problem {
+    ($planner:ident, $F:ident) => {
+        ForceProblem {
+            G: &$planner.G,
+            J: &$planner.grasp.J,
+            F_des: &$F,
+            f_prev: &$planner.f_prev,
+            tau_min: &$planner.tau_min,
+            tau_max: &$planner.tau_max,
+            f_normal_max: &$planner.f_limit,
+        }
+    };
+}
+
 impl DualStagePlanner {
     /// The planner for `hand` with the robust controller `K`.
     pub fn new(hand: HandModel, K: Controller, mut config: Config) -> Result<Self, Error> {
@@ -307,16 +322,9 @@ impl DualStagePlanner {
         self.f_limit.fill(self.config.force.f_n_max);
         self.f_limit[k] = 0.0;
         let scale = self.wrench_scale();
-        let problem = ForceProblem {
-            G: &self.G,
-            J: &self.grasp.J,
-            F_des: &F_des.component_mul(&scale),
-            f_prev: &self.f_prev,
-            tau_min: &self.tau_min,
-            tau_max: &self.tau_max,
-            f_normal_max: &self.f_limit,
-        };
-        let psi = self.probe.solve(&problem).map(|solution| solution.psi.component_div(&scale));
+        let F = F_des.component_mul(&scale);
+        let psi =
+            self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale));
         if psi.is_ok_and(|psi| self.overload(&psi) <= 1.0) {
             self.supervisor.start(k, &self.grasp);
         } else {
@@ -332,15 +340,8 @@ impl DualStagePlanner {
             self.f_prev[3 * j + 2] += self.guard.squeeze();
         }
         let scale = self.wrench_scale();
-        let solution = self.forces.solve(&ForceProblem {
-            G: &self.G,
-            J: &self.grasp.J,
-            F_des: &F_des.component_mul(&scale),
-            f_prev: &self.f_prev,
-            tau_min: &self.tau_min,
-            tau_max: &self.tau_max,
-            f_normal_max: &self.f_limit,
-        });
+        let F = F_des.component_mul(&scale);
+        let solution = self.forces.solve(&force_problem!(self, F));
         let d = &mut self.diagnostics;
         if let Ok(solution) = solution {
             self.f_prev.copy_from(&solution.f);
@@ -358,6 +359,7 @@ impl DualStagePlanner {
             d.status = ForceStatus::Held;
             d.solver = SolverUsed::Held;
         }
+        d.solver_counts = *self.forces.counts();
     }
 
     /// Eqs. (4) and (5) for the finger that slides or presses.

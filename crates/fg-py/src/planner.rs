@@ -124,6 +124,16 @@ impl Diagnostics {
         self.core.solver.as_str()
     }
 
+    /// Answers of each solver since the start, and how often and why one passed the QP on to the next.
+    #[getter]
+    fn solver_counts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counts = PyDict::new(py);
+        for (name, count) in self.core.solver_counts.by_name() {
+            counts.set_item(name, count)?;
+        }
+        Ok(counts)
+    }
+
     /// How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop".
     #[getter]
     fn safe_mode(&self) -> &'static str {

@@ -21,6 +21,8 @@ pub struct Recording {
     pub controller: Controller,
     pub config: Config,
     pub rows: Vec<(Measurement, Reference)>,
+    /// The torques that the recorded run commanded at each row, N m.
+    pub commands: Vec<DVector<f64>>,
 }
 
 impl Recording {
@@ -28,22 +30,24 @@ impl Recording {
     pub fn parse(bytes: &[u8]) -> Self {
         let end = bytes.iter().position(|b| *b == b'\n').expect("a line of JSON");
         let head: Value = serde_json::from_slice(&bytes[..end]).expect("JSON");
-        assert_eq!(head["format"], "fingergait-recording/1");
+        assert_eq!(head["format"], "fingergait-recording/2");
         let size = |field: &str| usize::try_from(head[field].as_u64().expect(field)).expect(field);
         let (n, m, rows) = (size("fingers"), size("joints"), size("rows"));
         let rate = head["rate_hz"].as_f64().expect("rate_hz");
-        let width = 2 * n * m + 7 + 4 * n + 7 + 6;
+        let sensed = 2 * n * m + 7 + 4 * n + 7 + 6;
+        let width = sensed + n * m;
         let numbers: Vec<f64> = bytes[end + 1..]
             .chunks_exact(4)
             .map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])))
             .collect();
         assert_eq!(numbers.len(), rows * width);
-        let rows = numbers.chunks_exact(width).enumerate();
+        let rows = || numbers.chunks_exact(width).map(|row| row.split_at(sensed));
         Self {
             hand: HandModel::from_json(&head["hand"].to_string()).expect("hand"),
             controller: Controller::from_json(&head["controller"].to_string()).expect("controller"),
             config: Config::from_json(&head["config"].to_string()).expect("config"),
-            rows: rows.map(|(k, row)| parse_row(k as f64 / rate, n, m, row)).collect(),
+            rows: rows().enumerate().map(|(k, (row, _))| parse_row(k as f64 / rate, n, m, row)).collect(),
+            commands: rows().map(|(_, tau)| DVector::from_column_slice(tau)).collect(),
         }
     }
 

@@ -14,6 +14,7 @@ impl DualStagePlanner {
         self.quality.reset();
         self.supervisor.reset();
         self.release();
+        self.forces.reset_counts();
         self.slip.reset();
         self.friction.reset();
         self.assume_friction();

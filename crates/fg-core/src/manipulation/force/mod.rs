@@ -121,7 +121,7 @@ impl ForceOptimizer {
         self.qp.n_contacts()
     }
 
-    /// Answers taken so far, and reasons.
+    /// Answers taken since construction or [`ForceOptimizer::reset_counts`], and reasons.
     pub fn counts(&self) -> &SolverCounters {
         &self.counters
     }
@@ -130,6 +130,11 @@ impl ForceOptimizer {
     pub fn reset(&mut self) {
         self.fast.reset();
         self.last = [0.0; WIDTH];
+    }
+
+    /// Counts from zero again.
+    pub fn reset_counts(&mut self) {
+        self.counters = SolverCounters::default();
     }
 
     /// Changes the pyramid of `contact`, to one with the same number of edges. Allocates nothing.

@@ -95,6 +95,24 @@ pub struct SolverCounters {
 }
 
 impl SolverCounters {
+    /// The counts by name.
+    pub fn by_name(&self) -> [(&'static str, u64); 12] {
+        [
+            ("active_set", self.active_set),
+            ("clarabel_polished", self.clarabel_polished),
+            ("clarabel", self.clarabel),
+            ("held", self.held),
+            ("fast_stopped", self.fast_stopped),
+            ("fast_uncertified", self.fast_uncertified),
+            ("careful_undecided", self.careful_undecided),
+            ("active_set_infeasible", self.active_set_infeasible),
+            ("bounds_inconsistent", self.bounds_inconsistent),
+            ("clarabel_infeasible", self.clarabel_infeasible),
+            ("clarabel_failed", self.clarabel_failed),
+            ("clarabel_uncertified", self.clarabel_uncertified),
+        ]
+    }
+
     pub(super) fn count(&mut self, solver: SolverUsed) {
         *match solver {
             SolverUsed::ActiveSet => &mut self.active_set,
