@@ -151,7 +151,7 @@ def test_the_measured_rate_is_the_derivative() -> None:
 
 
 def test_a_run_without_gaits_names_the_joint_or_torque_limit_that_came_first() -> None:
-    lost = run_case(Case("x", "lift-and-rotate", {"duration": 20.0, "gait.enabled": False}))
+    lost = run_case(Case("x", "lift-and-rotate", {"duration": 60.0, "gait.enabled": False}))
     assert not lost.kept
     constraints = lost.extra["constraints"]
     times = [item["at_s"] for item in constraints]

@@ -132,7 +132,7 @@ def test_an_encoder_that_is_off_for_good_is_refused_for_good() -> None:
 
 def test_the_object_is_held_while_a_finger_looks_for_it() -> None:
     # Its commands go to the wrong joints for a while, and it ends up off the object.
-    fault = {"kind": "joint_order_swapped", "finger": 2, "joint": 0, "other": 1, "at": 5.897, "duration": 0.25}
+    fault = {"kind": "joint_order_swapped", "finger": 1, "joint": 0, "other": 1, "at": 4.0, "duration": 0.25}
     run = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 15.0, "fault": [fault]}))
     assert not run.metrics["dropped"]
     assert np.any(run.log["faults"].astype(int) & BITS["finger_lost"])

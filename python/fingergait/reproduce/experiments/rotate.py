@@ -20,7 +20,7 @@ def rotate(quick: bool) -> Experiment:
         "object is 20 % heavier than believed and has 50 % more inertia.",
         cases=(
             Case(_WITH, base, {"duration": duration}, trace=True, film=True),
-            Case(_WITHOUT, base, {"duration": 30.0, "gait.enabled": False}, trace=True, film=True),
+            Case(_WITHOUT, base, {"duration": 60.0, "gait.enabled": False}, trace=True, film=True),
             Case(_BACK, base, {"duration": 36.0, "reference.yaw_rate": -0.2}),
         ),
         judge=lambda outcomes: _judge(outcomes, duration),
