@@ -169,6 +169,19 @@ def test_an_object_is_lost_after_a_sustained_symptom(pose: list[float], forces: 
     assert symptom in monitor.symptom
 
 
+def test_yaw_that_lags_is_no_loss_once_the_reference_has_stood_until_it_has_caught_up() -> None:
+    monitor = LossMonitor(Scenario.build({}))
+    turned = np.array([0.0, 0.0, 0.06, np.cos(0.5), 0.0, 0.0, np.sin(0.5)])
+    tilted = np.array([0.0, 0.0, 0.06, np.cos(0.5), np.sin(0.5), 0.0, 0.0])
+    assert not monitor.update(0.0, UPRIGHT, turned, TOUCHING, standing=True)
+    assert not monitor.update(1.0, UPRIGHT, turned, TOUCHING)
+    assert not monitor.update(1.2, UPRIGHT, tilted, TOUCHING)
+    assert monitor.update(1.4, UPRIGHT, tilted, TOUCHING)
+    assert not monitor.update(2.0, UPRIGHT, UPRIGHT, TOUCHING)  # caught up
+    assert not monitor.update(3.0, UPRIGHT, turned, TOUCHING)
+    assert monitor.update(3.2, UPRIGHT, turned, TOUCHING)
+
+
 def test_a_step_of_the_reference_is_no_loss_while_it_settles() -> None:
     monitor = LossMonitor(Scenario.build({"reference": {"step": [0.0, 0.0, 0.03, 0.0, 0.0, 0.5]}}))
     desired = np.array([0.0, 0.0, 0.09, np.cos(0.25), 0.0, 0.0, np.sin(0.25)])

@@ -25,9 +25,8 @@ class LossMonitor:
     Parameters
     ----------
     scenario
-        Its reference step, which for two seconds is no error. With faults, and once the controller has left its normal
-        mode, the reference may stand inside the controller: then only a tilt of the object's axis counts as an error of
-        orientation.
+        Its reference step, which for two seconds is no error. With faults the reference may stand inside the
+        controller: then only a tilt of the object's axis counts as an error of orientation.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -35,15 +34,17 @@ class LossMonitor:
         self._step_at = scenario.reference.step_at
         self._allowance = math.hypot(*step[:3]), math.hypot(*step[3:])
         self._tilt_only = bool(scenario.fault)
+        self._lags = False
         self._since: float | None = None
         self.symptom = ""
 
     def update(self, t: float, true: Array, desired: Array, normal_forces: Array, standing: bool = False) -> bool:
         """True once the object is lost, from the poses (7,) and the fingertips' normal forces, N.
 
-        `standing`: the controller lets the reference stand in this step.
+        `standing`: the controller lets the reference stand in this step. From then on only a tilt counts, until the
+        object has caught up with the desired yaw.
         """
-        self._tilt_only |= standing
+        self._lags = standing or (self._lags and _angle(true.tolist(), desired.tolist()) > ORIENTATION_LIMIT)
         symptom = self._symptom(t, true.tolist(), desired.tolist(), normal_forces)
         if symptom is None:
             self._since = None
@@ -58,16 +59,18 @@ class LossMonitor:
         orientation_limit = ORIENTATION_LIMIT + (self._allowance[1] if stepping else 0.0)
         if math.dist(p[:3], d[:3]) > position_limit:
             return f"the position error passed {1e3 * POSITION_LIMIT:.0f} mm"
-        if self._tilt_only:
-            angle = _tilt(p, d)
-        else:
-            cosine = abs(p[3] * d[3] + p[4] * d[4] + p[5] * d[5] + p[6] * d[6])
-            angle = 2.0 * math.acos(min(1.0, cosine))
+        angle = _tilt(p, d) if self._tilt_only or self._lags else _angle(p, d)
         if angle > orientation_limit:
             return f"the orientation error passed {ORIENTATION_LIMIT} rad"
         if t > 0.0 and np.count_nonzero(normal_forces) < 2:
             return "fewer than two fingertips touched the object"
         return None
+
+
+def _angle(p: list[float], d: list[float]) -> float:
+    """Angle between two orientations, rad."""
+    cosine = abs(p[3] * d[3] + p[4] * d[4] + p[5] * d[5] + p[6] * d[6])
+    return 2.0 * math.acos(min(1.0, cosine))
 
 
 def _tilt(p: list[float], d: list[float]) -> float:

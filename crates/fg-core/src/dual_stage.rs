@@ -196,7 +196,7 @@ impl DualStagePlanner {
     /// The step on a measurement that can be used.
     fn run(&mut self, measurement: &Measurement, reference: &Reference) {
         self.grasp.update(&self.hand, &self.state, measurement);
-        if !self.guard.gaits() {
+        if !self.guard.allows_gaits() {
             self.supervisor.abort();
         }
         self.supervise(measurement);
@@ -204,7 +204,7 @@ impl DualStagePlanner {
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
-        if self.guard.gaits() {
+        if self.guard.allows_gaits() {
             self.choose_finger(measurement, &F_des);
         }
         self.optimise_forces(&F_des);
@@ -231,6 +231,7 @@ impl DualStagePlanner {
         if first {
             self.supervisor.set_threshold(quality.Q);
         }
+        self.supervisor.await_gait(quality.Q);
         self.diagnostics.quality = quality;
         for (j, h) in self.diagnostics.heights.iter_mut().enumerate() {
             *h = self.quality.height_error(&scene, j);

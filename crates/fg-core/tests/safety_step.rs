@@ -266,3 +266,39 @@ fn no_order_of_calls_panics() {
         assert!(planner.diagnostics().tau.iter().all(|tau| tau.is_finite()));
     }
 }
+
+#[test]
+fn an_overdue_grasp_makes_the_desired_motion_stand() {
+    // No finger is ever free to go: any slack at all is too much.
+    let mut replay = Replay::new(|config| {
+        config.gait.slack_force = 1e-9;
+        config.gait.slack_torque = 1e-9;
+        config.gait.overdue_margin = 0.0;
+        config.gait.overdue_time = 0.04;
+    });
+    let mut begun = 0;
+    for k in 0..replay.recording.rows.len() {
+        replay.run(k..k + 1, |_, _, _| ());
+        let d = replay.planner.diagnostics();
+        assert_eq!(d.gaits, 0);
+        if replay.has(Fault::Overdue) {
+            assert!(begun > 0 || d.quality.Q < d.threshold, "step {k}");
+            // The fault is found at the end of a step, and the mode decided at the beginning of the next.
+            assert!(begun == 0 || replay.mode() == SafeMode::Hold, "step {k}");
+            begun += 1;
+        } else {
+            begun = 0;
+        }
+    }
+    assert!(begun > 10, "to the end");
+    // Never without gaits to wait for.
+    let mut replay = Replay::new(|config| {
+        config.gait.enabled = false;
+        config.gait.overdue_margin = 0.0;
+        config.gait.overdue_time = 0.04;
+    });
+    for k in 0..replay.recording.rows.len() {
+        replay.run(k..k + 1, |_, _, _| ());
+        assert!(!replay.has(Fault::Overdue), "step {k}");
+    }
+}

@@ -43,8 +43,8 @@ class FaultDraw(Table):
     """One kind of fault of the campaign: constants and distributions for its keys.
 
     `label` is its name in the report, the kind by default. `promise` is what the controller's table of faults says of
-    it: "hold", the object stays in the hand; "stop", it may be lost, the commands stay within their limits; "none", the
-    table says nothing.
+    it: "hold", the object stays in the hand; "stop", the mode stop is reached; "none", only what all promise:
+    commands stay within their limits.
     """
 
     label: str

@@ -77,8 +77,7 @@ def mu_curve(
     lower : whether to find the lower bound as well
     refine : extra frequencies on each side of the peak
     """
-    kind = real_scalars if real else list
-    structures = [parse_blocks(kind(problem.plant.blocks())) for problem in problems]
+    structures = [parse_blocks(problem.plant.blocks(real=real)) for problem in problems]
 
     def responses(w: Array) -> list[ComplexArray]:
         return [response(problem.plant, problem.K, w, delay) for problem in problems]
@@ -92,7 +91,7 @@ def mu_curve(
         return MuCurve(grid, values, np.zeros_like(values))
     low = np.zeros_like(values)
     for M, blocks in zip(responses(grid), structures, strict=True):
-        # A part whose upper bound is no higher than what another part has proven can't raise it.
+        # A part whose upper bound is at most 1 % above what another part has proven can hardly raise it.
         higher = upper_bound(M, blocks, tolerance=1e-3).value > 1.01 * low
         if higher.any():
             low[higher] = np.maximum(low[higher], lower_bound(M[higher], blocks))
@@ -120,8 +119,10 @@ def refined(omega: Array, bound: Callable[[Array], Array], points: int) -> tuple
     return omega[order], values[order]
 
 
-def parts(problems: Sequence[Problem], omega: Array, delay: float) -> dict[str, Array]:
+def parts(problems: Sequence[Problem], omega: Array, delay: float, *, real: bool = False) -> dict[str, Array]:
     """What each part of the structure contributes: mu (n_w,) with the other parts left out, the largest over problems.
+
+    `real` as in `mu_curve`.
 
     Keys: "mass and inertia", "damping" if there is a damping block, "stability" (all of Delta, no performance) and
     "performance" (no Delta: the largest singular value).
@@ -136,7 +137,8 @@ def parts(problems: Sequence[Problem], omega: Array, delay: float) -> dict[str, 
         if body.has_damping_block:
             slices |= {"damping": (slice(q, k), delta[len(inertia) :]), "stability": (slice(0, k), delta)}
         for name, (pick, blocks) in slices.items():
-            value = upper_bound(M[:, pick, pick], parse_blocks(blocks), tolerance=1e-3).value
+            structure = parse_blocks(real_scalars(blocks) if real else blocks)
+            value = upper_bound(M[:, pick, pick], structure, tolerance=1e-3).value
             found.setdefault(name, []).append(value)
         found.setdefault("performance", []).append(np.linalg.norm(M[:, k:, k:], 2, axis=(1, 2)))
     return {name: np.max(values, axis=0) for name, values in found.items()}

@@ -67,8 +67,9 @@ class Certificate:
         lines = [
             f"At {c.rate_hz:.0f} Hz with {dead}, stability and the performance that the weights state are kept for "
             f"{covered}, all at once. The largest structured singular value of the coupled six-axis problem is at most "
-            f"{shipped.peak:.3f} (at {shipped.peak_omega:.3g} rad/s), the parameters being real numbers: uncertainty and performance level together may "
-            f"grow by a factor of {1 / shipped.peak:.2f} before the guarantee ends.",
+            f"{shipped.peak:.3f} (at {shipped.peak_omega:.3g} rad/s), the parameters being real numbers: "
+            f"uncertainty and performance level together may grow by a factor of {1 / shipped.peak:.2f} before the "
+            "guarantee ends.",
             f"The lower bound found is {low_bound:.3f}, so the guarantee is tight to "
             f"{100 * (1 - low_bound / shipped.peak):.0f} %. If the parameters could be any complex numbers of the same "
             f"size, the bound would be {self.complex_peak:.3f}; so taken, the peaks axis by axis are "

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter, savgol_filter
 
-from fingergait.log import Log
 from fingergait.pose_error import pose_errors
-from fingergait.scenario import Scenario
 
 from .spec import SynthesisSpec
 from .statespace import Array
+
+if TYPE_CHECKING:  # what runs a simulation is not needed to read its log
+    from fingergait.log import Log
+    from fingergait.scenario import Scenario
 
 _WINDOW = 1.0  # s from the start of a pulse that are used
 _SMOOTH = 9  # samples of the cubic fit that differentiates the pose
 
 
 def identify_damping(log: Log, scenario: Scenario, spec: SynthesisSpec) -> Array:
-    """B (6, 6) of M V' + B V = wrench, in W at Oo, [translation; rotation], from a run with pulses on an object at rest.
+    """B (6, 6) of M V' + B V = wrench, in W at Oo, [translation; rotation], from pulses on an object at rest.
 
     Kinematics alone (`reflect`) leave out the torsional friction of the fingertips and the softness of the contacts,
     and say nothing about which grasp to take: the arms move as the object is lifted.
@@ -27,7 +31,7 @@ def identify_damping(log: Log, scenario: Scenario, spec: SynthesisSpec) -> Array
     ----------
     log, scenario
         A run whose reference is constant during the pulses, such as `push-at-rest`. The true pose is differentiated:
-        this is for the design of a controller, not for use in one.
+        this is for the design of a controller, not for use in one. The wrench is what K asked for, `F_des`.
     spec
         Gives the nominal object, the fingers' inertia and the motors' lag.
 
@@ -64,6 +68,6 @@ def identify_damping(log: Log, scenario: Scenario, spec: SynthesisSpec) -> Array
 
 
 def _lagged(command: ArrayLike, lag: float, dt: float) -> Array:
-    """What the motors make of a command (T, 6) one sample later, a first-order lag in s."""
+    """The motors' torque at each sample, from commands (T, 6) held from sample to sample; a first-order lag, s."""
     pole = np.exp(-dt / lag) if lag > 0.0 else 0.0
     return np.asarray(lfilter([0.0, 1.0 - pole], [1.0, -pole], np.asarray(command, dtype=float), axis=0))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .blocks import Blocks
+from .blocks import Blocks, real_scalars
 from .interconnect import interconnect
 from .statespace import ComplexArray, StateSpace, append, gain, system
 from .uncertainty import UncertainBody
@@ -67,10 +67,10 @@ class GeneralizedPlant:
     weights: Sequence[AxisWeights]
     actuation: Actuation = Actuation()
 
-    def blocks(self) -> Blocks:
-        """Structure for the mu of the closed loop: Delta's blocks and one full performance block, 3q x 2q."""
-        q = self.body.q
-        return [*self.body.blocks(), (3 * q, 2 * q)]
+    def blocks(self, *, real: bool = False) -> Blocks:
+        """Structure for the mu of the closed loop: Delta's scalars, real or complex, and a full performance block."""
+        q, delta = self.body.q, self.body.blocks()
+        return [*(real_scalars(delta) if real else delta), (3 * q, 2 * q)]
 
     def statespace(self, *, dead_time: bool = True) -> StateSpace:
         """The generalised plant P. The dead time enters as a Pade approximation, or not at all."""

@@ -126,7 +126,7 @@ def synthesize(
         full=full,
         complex_peak=complex_mu(spec, shipped),
         per_axis=tuple(by_axis[i].mu[STAGES[-1]].peak for i in range(6)),
-        parts=parts(problems(spec, shipped), full[STAGES[-1]].omega, c.delay),
+        parts=parts(problems(spec, shipped), full[STAGES[-1]].omega, c.delay, real=True),
         stability=stability,
         margins=margins(loop),
         axis_margins=tuple(of_axis[by_axis[i].axes[0]] for i in range(6)),

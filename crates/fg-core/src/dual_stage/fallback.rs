@@ -76,12 +76,13 @@ impl DualStagePlanner {
         }
     }
 
-    /// Leaves fingers without power to their own weight, and tests their motors.
+    /// Leaves fingers without power to their own weight, and tests their motors while there is something to see it by.
     pub(super) fn test_motors(&mut self) {
-        let n_joints = self.hand.n_joints();
+        let (n_joints, blind) = (self.hand.n_joints(), self.guard.blind());
         for at in 0..self.command.tau.len() {
             if !self.guard.drives(at / n_joints) {
-                self.command.tau[at] = self.guard.motor_test(at).unwrap_or(self.tau_own[at]);
+                let test = self.guard.motor_test(at).filter(|_| !blind);
+                self.command.tau[at] = test.unwrap_or(self.tau_own[at]);
             }
         }
     }

@@ -79,9 +79,9 @@ pub struct Supervisor {
     threshold: Option<f64>,
     refused: Vec<bool>,
     since_refusal: f64,
-    /// Time for which the event has asked for a gait in vain, s.
+    /// Time without a gait for which Q has been below its threshold since the last gait that was not broken off, s.
     waiting: f64,
-    /// How far Q was below its threshold when the event last asked.
+    /// How far Q is below its threshold.
     deficit: f64,
     end: GaitEnd,
     gaits: u64,
@@ -117,7 +117,9 @@ impl Supervisor {
         self.off.fill(0.0);
         self.threshold = None;
         self.refused.fill(false);
+        self.since_refusal = 0.0;
         self.waiting = 0.0;
+        self.deficit = 0.0;
         self.end = GaitEnd::None;
         self.gaits = 0;
     }
@@ -172,12 +174,22 @@ impl Supervisor {
         self.threshold = Some(first - self.config.threshold_margin);
     }
 
+    /// Takes note of this step's quality; says nothing yet of whether a finger can be freed.
+    pub fn await_gait(&mut self, Q: f64) {
+        self.deficit = self.threshold.map_or(0.0, |threshold| threshold - Q);
+        if !self.config.enabled || self.deficit <= 0.0 {
+            self.waiting = 0.0;
+        } else if self.phase == Phase::Hold {
+            self.waiting += self.dt;
+        }
+    }
+
     /// The finger to free next, if the event of Section III-A has come: all fingertips in static contact and Q < delta_Q.
     ///
     /// The candidate has small manipulability and leaves a large remaining grasp; fingers that were refused a moment ago
     /// are passed over. `promises(k)` says whether freeing finger k can raise Q at all.
     pub fn candidate(
-        &mut self,
+        &self,
         now: &Quality,
         quality: &QualityModel,
         scene: &Scene<'_>,
@@ -188,11 +200,8 @@ impl Supervisor {
             && self.touching >= STATIC_AFTER
             && self.threshold.is_some_and(|threshold| now.Q < threshold);
         if !event {
-            self.waiting = 0.0;
             return None;
         }
-        self.waiting += self.dt;
-        self.deficit = self.threshold.map_or(0.0, |threshold| threshold - now.Q);
         let score = |k: usize| {
             self.config.w1 * quality.remaining_quality(scene, k)
                 - self.config.w2 * quality.manipulability(k, scene.q)
@@ -217,7 +226,6 @@ impl Supervisor {
         self.free = k;
         self.f_start = grasp.contact(k).f_n;
         self.gaits += 1;
-        self.waiting = 0.0;
         self.enter(Phase::Unload);
     }
 
@@ -230,7 +238,10 @@ impl Supervisor {
     /// Ends a gait early: a finger that slides presses, one that is being unloaded is loaded again.
     pub fn abort(&mut self) {
         match self.phase {
-            Phase::Unload => self.enter(Phase::Load),
+            Phase::Unload => {
+                self.end = GaitEnd::Abort;
+                self.enter(Phase::Load);
+            }
             Phase::Slide => {
                 self.end = GaitEnd::Abort;
                 self.enter(Phase::Press);
@@ -258,7 +269,12 @@ impl Supervisor {
                 }
             }
             Phase::Press if touching => self.enter(Phase::Load),
-            Phase::Load if self.elapsed >= self.config.load_time => self.enter(Phase::Hold),
+            Phase::Load if self.elapsed >= self.config.load_time => {
+                if self.end != GaitEnd::Abort {
+                    self.waiting = 0.0;
+                }
+                self.enter(Phase::Hold);
+            }
             _ => {}
         }
     }

@@ -88,7 +88,7 @@ pub struct Guard {
     faults: Faults,
     mode: SafeMode,
     /// Gaits may begin and go on.
-    gaits: bool,
+    allows_gaits: bool,
     /// No feedback in this step.
     blind: bool,
     squeeze: f64,
@@ -111,7 +111,7 @@ impl Guard {
             conditions: Conditions::default(),
             faults: Faults::default(),
             mode: SafeMode::Normal,
-            gaits: true,
+            allows_gaits: true,
             blind: false,
             squeeze: 0.0,
             damped: vec![false; hand.n_fingers()],
@@ -133,7 +133,7 @@ impl Guard {
         self.conditions = Conditions::default();
         self.faults = Faults::default();
         self.mode = SafeMode::Normal;
-        self.gaits = true;
+        self.allows_gaits = true;
         self.blind = false;
         self.squeeze = 0.0;
         self.damped.fill(false);
@@ -150,8 +150,8 @@ impl Guard {
     }
 
     /// True where gaits may begin and go on: nothing is wrong but, at most, the grasp itself.
-    pub fn gaits(&self) -> bool {
-        self.gaits
+    pub fn allows_gaits(&self) -> bool {
+        self.allows_gaits
     }
 
     /// True where neither the sensor nor the fingers tell the object's pose: the last wrench is all there is.
@@ -379,7 +379,7 @@ impl Guard {
         if gone || !(self.joints.known() && self.pose.known()) {
             mode = SafeMode::Stop;
         }
-        self.gaits = !slow && mode <= SafeMode::Hold;
+        self.allows_gaits = !slow && mode <= SafeMode::Hold;
         self.mode = mode;
     }
 }

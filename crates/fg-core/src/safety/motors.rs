@@ -110,9 +110,10 @@ impl MotorGuard {
         let joints = &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints];
         let pairs = asked.iter().copied().zip(given.iter().copied());
         if finger.released {
-            // NaN follows nothing.
-            let follows =
-                |((a, g), joint): ((f64, f64), &Joint)| !joint.dead || (a - g).abs() < c.motor_given;
+            // NaN follows nothing, and what was not asked for the test proves nothing.
+            let follows = |((a, g), joint): ((f64, f64), &Joint)| {
+                !joint.dead || (a.abs() > c.motor_asked && (a - g).abs() < c.motor_given)
+            };
             if finger.test(dt, || pairs.zip(joints.iter()).all(follows)) {
                 *finger = Finger::default();
                 joints.fill(Joint::default());
@@ -194,6 +195,16 @@ mod tests {
         assert!(!guard.drives(1));
         drive(&mut guard, 60, 0.2, &[]);
         assert!(guard.drives(1) && !guard.failed());
+    }
+
+    #[test]
+    fn a_torque_that_was_not_asked_for_proves_nothing() {
+        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        drive(&mut guard, 20, 0.2, &[3, 4, 5]);
+        for _ in 0..200 {
+            guard.admit(&[0.01; 12], &[0.0; 12]);
+            assert!(!guard.drives(1));
+        }
     }
 
     #[test]
