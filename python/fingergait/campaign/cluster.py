@@ -42,7 +42,8 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         return
     settings = {
         "distributed.worker.daemon": True,
-        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.scheduler.worker-saturation": 2.0,  # the next run is there when one ends
+        "distributed.worker.profile.enabled": False,  # it stops the run a hundred times a second
         "distributed.admin.tick.limit": "60s",
     }
     with dask.config.set(settings):
