@@ -1,51 +1,15 @@
 //! The force optimiser's fast path and the gait LP allocate nothing.
 #![allow(non_snake_case)]
 
+mod counting;
 mod instances;
 
+use counting::allocations;
 use fg_core::friction::FrictionPyramid;
 use fg_core::manipulation::force::{ForceOptimizer, ForceSettings, SolverUsed};
 use fg_core::solver::knapsack::gait_lp;
 use instances::{Random, Sequence, FAMILIES};
 use nalgebra::DVector;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-struct Counting;
-
-thread_local! {
-    // Per thread: the test harness allocates in its own.
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-fn count() {
-    // Nothing to count while the thread ends.
-    let _ = COUNT.try_with(|n| n.set(n.get() + 1));
-}
-
-// SAFETY: every call goes to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        System.alloc(layout)
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        System.dealloc(pointer, layout);
-    }
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        System.realloc(pointer, layout, size)
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations<T>(act: impl FnOnce() -> T) -> (T, u64) {
-    let before = COUNT.get();
-    let result = act();
-    (result, COUNT.get() - before)
-}
 
 #[test]
 fn the_counter_counts() {

@@ -2,42 +2,14 @@
 #![allow(non_snake_case)] // the paper's letters, as in fg-core
 #![allow(unsafe_code)] // an allocator cannot be written without
 
+mod counting;
 #[path = "../benches/recording/mod.rs"]
 mod recording;
 
+use counting::allocations;
 use fg_core::manipulation::force::SolverUsed;
 use fg_core::safety::SafeMode;
 use recording::{Recording, NOISY, ROTATE};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-thread_local! {
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-/// Counts what the calling thread asks for.
-struct Counting;
-
-// SAFETY: every call is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|count| count.set(count.get() + 1));
-        System.alloc(layout)
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        COUNT.with(|count| count.set(count.get() + 1));
-        System.dealloc(pointer, layout);
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(work: impl FnOnce()) -> u64 {
-    let before = COUNT.with(Cell::get);
-    work();
-    COUNT.with(Cell::get) - before
-}
 
 /// Steps through `recording`, each measurement spoilt by `spoil(k, ..)`; asserts that none of the steps allocates where the
 /// fast path answers. Returns the phases and modes seen.
@@ -52,7 +24,7 @@ fn replay(
     for (k, (measurement, reference)) in recording.rows.iter().enumerate() {
         let (mut measurement, mut reference) = (measurement.clone(), *reference);
         spoil(k, &mut measurement, &mut reference);
-        let count = allocations(|| {
+        let ((), count) = allocations(|| {
             planner.step(&measurement, &reference).unwrap();
         });
         let d = planner.diagnostics();
