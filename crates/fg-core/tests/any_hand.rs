@@ -188,6 +188,9 @@ fn the_weight_of_the_object_is_held_against_the_hands_gravity() {
     }
 }
 
+/// Spoils a hand.
+type Change<'a> = &'a dyn Fn(&mut Vec<Finger>);
+
 #[test]
 fn bad_fields_are_named() {
     let good = || {
@@ -217,7 +220,7 @@ fn bad_fields_are_named() {
     };
     let (fingers, gravity) = good();
     HandModel::new(fingers, gravity).unwrap();
-    let cases: [(&str, &dyn Fn(&mut Vec<Finger>)); 14] = [
+    let cases: [(&str, Change); 14] = [
         ("hand.fingers[1].joints[2].follows.joint: expected 0 to 2, found 3", &|f| follow(f, 2, 3, 1.0)),
         ("hand.fingers[1].joints[2].follows.joint: expected a joint that", &|f| follow(f, 2, 2, 1.0)),
         ("hand.fingers[1].joints[1].follows.joint: expected a joint that", &|f| {
