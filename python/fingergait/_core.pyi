@@ -1,5 +1,6 @@
 """The compiled control step. Arrays are float64; units are SI and radians; quaternions are wxyz."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -29,14 +30,37 @@ class HandModel:
     @property
     def n_fingers(self) -> int: ...
     @property
-    def n_joints(self) -> int:
-        """Joints of one finger."""
+    def n_q(self) -> int:
+        """Independent joints of all fingers: those that follow no other."""
+    @property
+    def n_joints(self) -> Any:
+        """Independent joints of one finger: an int where all fingers have as many, else a list of one for each."""
+    def joints(self, finger: int) -> slice:
+        """Where the independent joints of `finger` are in a flat array (n_q,)."""
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Lower and upper limits, rad, narrowed so that joints that follow stay in theirs; shapes as of `tau_min`."""
+    @property
+    def tau_min(self) -> Array:
+        """Least torques that the model states, N m, NaN where it states none: (n_fingers, n_joints) where all fingers have
+        as many joints, else (n_q,). So are all arrays over the joints; (n_q,) is always taken."""
+    @property
+    def tau_max(self) -> Array:
+        """Largest torques that the model states, N m, NaN where it states none."""
+    @property
+    def reference(self) -> Array:
+        """The posture that the joints should return to, rad."""
+    @property
+    def gravity(self) -> Array:
+        """Acceleration of gravity in W, (3,), m/s^2."""
     def tip_positions(self, q: ArrayLike) -> Array:
-        """Centres of the fingertips in W, (n_fingers, 3), at joint angles q (n_fingers, n_joints)."""
+        """Centres of the fingertips in W, (n_fingers, 3), at joint angles q, rad."""
     def jacobian(self, q: ArrayLike, finger: int, point: ArrayLike) -> Array:
-        """Velocity Jacobian (3, n_joints) in W of the point of the last link now at `point` (3,) in W."""
+        """Velocity Jacobian (3, n_joints) in W of the point of the last link now at `point` (3,) in W, m/rad."""
     def gravity_torque(self, q: ArrayLike) -> Array:
-        """Torques (n_fingers, n_joints) that hold the fingers' own weight."""
+        """Torques that hold the fingers' own weight, N m."""
+    def spring_torque(self, q: ArrayLike) -> Array:
+        """Torques that hold the joints' springs, N m."""
 
 @final
 class Controller:
@@ -69,7 +93,7 @@ class Measurement:
         contact_place: ArrayLike,
         contact_force: ArrayLike,
     ) -> Measurement:
-        """t in s; q, tau (n_fingers, n_joints); pose (7,): position and wxyz quaternion of O in W; contact_place
+        """t in s; q, tau (n_fingers, n_joints) or (n_q,); pose (7,): position and wxyz quaternion of O in W; contact_place
         (n_fingers, 3): tactile contact in the fingertip frame F, m; contact_force (n_fingers,): normal force, N, zero
         where there is no contact."""
 
@@ -83,7 +107,7 @@ class Reference:
 class Command:
     @property
     def tau(self) -> Array:
-        """Desired joint torques, (n_fingers, n_joints), N m."""
+        """Desired joint torques, N m: (n_fingers, n_joints) where all fingers have as many joints, else (n_q,)."""
 
 @final
 class Diagnostics:
@@ -119,8 +143,8 @@ class Diagnostics:
     def step_allocations(self) -> int:
         """Heap allocations of this control step inside the compiled core."""
     @staticmethod
-    def columns(n_fingers: int, n_joints: int) -> list[str]:
-        """Names of the numbers that `row` gives, in order."""
+    def columns(n_fingers: int, n_joints: int | Sequence[int]) -> list[str]:
+        """Names of the numbers that `row` gives, in order. `n_joints` is that of each finger, or one number for all."""
     def row(self) -> Array:
         """Every figure of this step as one row, for a log. Deterministic: holds no time measurement."""
 
@@ -139,7 +163,16 @@ class DualStagePlanner:
 class TorquePid:
     """Joint torque tracking at the faster torque rate."""
 
-    def __new__(cls, n_joints_total: int, dt: float, config: str | None = None) -> TorquePid: ...
+    def __new__(
+        cls,
+        n_joints_total: int,
+        dt: float,
+        config: str | None = None,
+        tau_min: ArrayLike | None = None,
+        tau_max: ArrayLike | None = None,
+    ) -> TorquePid:
+        """tau_min, tau_max (n_joints_total,) in any shape: limits of the joints, N m, neither beyond `force.tau_max` of
+        `config`, which is the limit where they are absent; without a `config` that is 0.5 N m, of the paper's hand."""
     def step(self, tau_des: ArrayLike, tau: ArrayLike) -> Array:
         """Motor torques that drive the measured torques `tau` to `tau_des`; same shape as `tau_des`."""
     def reset(self) -> None: ...

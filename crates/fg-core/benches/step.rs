@@ -8,7 +8,7 @@ mod recording;
 use criterion::{criterion_group, criterion_main, Criterion, Throughput};
 use fg_core::config::Config;
 use fg_core::grasp::Grasp;
-use fg_core::hand::HandState;
+use fg_core::hand::{HandState, TorqueLimits};
 use fg_core::signals::{Measurement, Reference};
 use fg_core::torque::TorquePid;
 use recording::{Recording, NOISY, ROTATE};
@@ -21,7 +21,7 @@ fn parts(criterion: &mut Criterion) {
     let Recording { hand, rows, .. } = Recording::parse(ROTATE);
     let mut state = HandState::new(&hand);
     let mut grasp = Grasp::new(&hand, 0.01);
-    let mut weight = vec![0.0; hand.n_fingers() * hand.n_joints()];
+    let mut weight = vec![0.0; hand.n_q()];
     let mut next = {
         let mut k = 0;
         move || {
@@ -43,8 +43,9 @@ fn parts(criterion: &mut Criterion) {
         });
     });
     let config = Config::default();
-    let n = hand.n_fingers() * hand.n_joints();
-    let Ok(mut pid) = TorquePid::new(n, 1e-3, &config.torque, &config.force) else { return };
+    let n = hand.n_q();
+    let pid = TorqueLimits::uniform(n, 0.5).and_then(|limits| TorquePid::new(limits, 1e-3, &config.torque));
+    let Ok(mut pid) = pid else { return };
     let mut motor = vec![0.0; n];
     criterion.bench_function("torque_pid", |bencher| {
         bencher.iter(|| {

@@ -176,8 +176,9 @@ pub struct ForceConfig {
     pub friction: f64,
     /// Edges of the friction pyramid.
     pub edges: usize,
-    /// Torque limit of a joint, N m: tau_max = -tau_min.
-    pub tau_max: f64,
+    /// Largest torque of any joint, either way, N m. It caps the limits that the hand's model states, and is the limit of
+    /// joints of which it states none; `null`: the model's own limits, and none may be missing.
+    pub tau_max: Option<f64>,
     /// Largest normal force of a finger, N. Deviation: the paper bounds torques only.
     pub f_n_max: f64,
     /// Largest change of a joint torque command in a second, N m/s.
@@ -209,7 +210,7 @@ impl Default for ForceConfig {
             torque_length: 0.05,
             friction: 0.65,
             edges: 8,
-            tau_max: 0.5,
+            tau_max: None,
             f_n_max: 25.0,
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
@@ -310,7 +311,7 @@ impl Config {
             ("force.alpha3", f.alpha3, 1e-9, 1e9),
             ("force.torque_length", f.torque_length, 1e-3, 1e3),
             ("force.friction", f.friction, 0.01, 10.0),
-            ("force.tau_max", f.tau_max, positive, 1e3),
+            ("force.tau_max", f.tau_max.unwrap_or(1.0), positive, 1e3),
             ("force.f_n_max", f.f_n_max, positive, 1e6),
             ("force.tau_rate_max", f.tau_rate_max, positive, 1e9),
             ("force.tolerance", f.tolerance, positive, 1.0),

@@ -3,7 +3,6 @@
 use crate::gait::planner::GaitRate;
 use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
-use crate::hand::HandModel;
 use crate::manipulation::force::{ForceStatus, SolverCounters, SolverUsed};
 use crate::safety::{Faults, SafeMode};
 use nalgebra::{DVector, Vector6};
@@ -41,7 +40,8 @@ pub struct Diagnostics {
     pub slip: DVector<f64>,
     /// Times that slip has lowered the assumed friction.
     pub slips: u64,
-    /// Desired joint velocities of the free finger, rad/s.
+    /// Desired joint velocities of the free finger, rad/s; as long as the finger with the most joints, zero behind the free
+    /// one's last.
     pub qd_des: DVector<f64>,
     /// Torque command, N m.
     pub tau: DVector<f64>,
@@ -66,9 +66,10 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// Diagnostics for `hand`, all zero.
-    pub fn new(n_fingers: usize, n_joints: usize) -> Self {
+    /// Diagnostics for fingers with `counts` joints, all zero.
+    pub fn new(counts: &[usize]) -> Self {
         let zeros = DVector::zeros;
+        let n_fingers = counts.len();
         Self {
             phase: Phase::Hold,
             free_finger: None,
@@ -85,8 +86,8 @@ impl Diagnostics {
             heights: zeros(n_fingers),
             slip: zeros(n_fingers),
             slips: 0,
-            qd_des: zeros(n_joints),
-            tau: zeros(n_fingers * n_joints),
+            qd_des: zeros(counts.iter().copied().max().unwrap_or(0)),
+            tau: zeros(counts.iter().sum()),
             status: ForceStatus::Solved,
             solver: SolverUsed::ActiveSet,
             kkt: 0.0,
@@ -129,15 +130,14 @@ impl Diagnostics {
         show("safe_mode", &[f64::from(self.safe_mode as u8)]);
     }
 
-    /// Names of the numbers that [`Diagnostics::row`] writes, in order; elements of vectors end in their index.
-    pub fn columns(n_fingers: usize, n_joints: usize) -> Vec<String> {
+    /// Names of the numbers that [`Diagnostics::row`] writes, in order, for fingers with `counts` joints; elements of vectors
+    /// end in their index.
+    pub fn columns(counts: &[usize]) -> Vec<String> {
         let mut names = Vec::new();
-        Self::new(n_fingers.min(HandModel::MAX_FINGERS), n_joints.min(HandModel::MAX_JOINTS)).visit(
-            |name, values| match values.len() {
-                1 => names.push(name.to_owned()),
-                n => names.extend((0..n).map(|i| format!("{name}_{i}"))),
-            },
-        );
+        Self::new(counts).visit(|name, values| match values.len() {
+            1 => names.push(name.to_owned()),
+            n => names.extend((0..n).map(|i| format!("{name}_{i}"))),
+        });
         names
     }
 
@@ -153,8 +153,10 @@ mod tests {
 
     #[test]
     fn a_row_has_as_many_numbers_as_columns() {
-        let mut row = Vec::new();
-        Diagnostics::new(4, 3).row(&mut row);
-        assert_eq!(row.len(), Diagnostics::columns(4, 3).len());
+        for counts in [&[3; 4][..], &[1, 1], &[1, 7, 2, 4, 3]] {
+            let mut row = Vec::new();
+            Diagnostics::new(counts).row(&mut row);
+            assert_eq!(row.len(), Diagnostics::columns(counts).len());
+        }
     }
 }

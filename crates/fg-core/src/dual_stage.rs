@@ -12,7 +12,7 @@ use crate::gait::quality::QualityModel;
 use crate::gait::supervisor::{Phase, Supervisor};
 use crate::gait::velocity_force::VelocityForceController;
 use crate::grasp::{Grasp, Scene};
-use crate::hand::{HandModel, HandState};
+use crate::hand::{HandModel, HandState, TorqueLimits};
 use crate::manipulation::feedforward::damping_torque;
 use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, ForceStatus, SolverUsed};
 use crate::manipulation::robust::{Controller, RobustController};
@@ -52,7 +52,8 @@ pub struct DualStagePlanner {
     psi_filtered: Vector6<f64>,
     tau_min: DVector<f64>,
     tau_max: DVector<f64>,
-    /// Torques that the fingers need for themselves: their weight, and their damping along the desired motion, N m.
+    /// Torques that the fingers need for themselves: their weight, their springs, and their damping along the desired
+    /// motion, N m.
     tau_own: DVector<f64>,
     tau_free: Vec<f64>,
     steady: SteadyWrench,
@@ -101,8 +102,8 @@ impl DualStagePlanner {
         // A force that may be commanded is not full scale.
         config.safety.tactile_max = config.safety.tactile_max.max(1.2 * config.force.f_n_max);
         let dt = 1.0 / config.rate_hz;
-        let (n, n_joints) = (hand.n_fingers(), hand.n_joints());
-        let n_q = n * n_joints;
+        let (n, n_q) = (hand.n_fingers(), hand.n_q());
+        let limits = TorqueLimits::of(&hand, config.force.tau_max)?;
         let pyramid = FrictionPyramid::inscribed(config.force.friction, config.force.edges)?;
         let settings = ForceSettings {
             alpha: [config.force.alpha1, config.force.alpha2, config.force.alpha3],
@@ -112,7 +113,7 @@ impl DualStagePlanner {
             ..ForceSettings::default()
         };
         let pyramids = vec![pyramid.clone(); n];
-        let mut diagnostics = Diagnostics::new(n, n_joints);
+        let mut diagnostics = Diagnostics::new(&hand.counts());
         diagnostics.friction = config.force.friction;
         Ok(Self {
             dt,
@@ -121,7 +122,7 @@ impl DualStagePlanner {
             grasp: Grasp::new(&hand, config.gait.contact_force),
             quality: QualityModel::new(&hand, &config.gait),
             supervisor: Supervisor::new(&hand, &config.gait, dt),
-            robust: RobustController::new(K, &config.robust, config.mass, dt)?,
+            robust: RobustController::new(K, &config.robust, config.mass, &hand.gravity(), dt)?,
             forces: ForceOptimizer::new(&pyramids, n_q, settings.clone())?,
             probe: ForceOptimizer::new(&pyramids, n_q, settings)?,
             slip: SlipDetector::new(&hand, dt),
@@ -136,9 +137,9 @@ impl DualStagePlanner {
             tau_min: DVector::zeros(n_q),
             tau_max: DVector::zeros(n_q),
             tau_own: DVector::zeros(n_q),
-            tau_free: vec![0.0; n_joints],
+            tau_free: vec![0.0; hand.most_joints()],
             steady: SteadyWrench::new(dt),
-            limiter: TorqueLimiter::new(n_q, &config.force, dt),
+            limiter: TorqueLimiter::new(limits, config.force.tau_rate_max, dt),
             fade: (-dt / config.safety.stop_time).exp(),
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
@@ -285,24 +286,27 @@ impl DualStagePlanner {
 
     /// Torques left for the contact forces, once the fingers' own weight and motion have had theirs.
     fn bound_torques(&mut self, measurement: &Measurement) {
-        let n_joints = self.hand.n_joints();
-        self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
+        self.hold_up();
         let share = self.config.robust.feedforward;
         if share > 0.0 {
             let scene = scene!(self, measurement);
             // Eq. (5) has its own velocity term for the finger that slides.
             let sliding = self.supervisor.sliding_finger();
             for k in (0..self.hand.n_fingers()).filter(|k| Some(*k) != sliding) {
-                damping_torque(&self.hand, k, &scene, &mut self.tau_free);
-                for (i, tau) in self.tau_free.iter().enumerate() {
-                    self.tau_own[k * n_joints + i] += share * tau;
-                }
+                damping_torque(&self.hand, k, &scene, share, self.tau_own.as_mut_slice());
             }
         }
-        for (i, tau_own) in self.tau_own.iter().enumerate() {
-            self.tau_min[i] = -self.config.force.tau_max - tau_own;
-            self.tau_max[i] = self.config.force.tau_max - tau_own;
+        let limits = self.limiter.limits();
+        for (at, tau_own) in self.tau_own.iter().enumerate() {
+            self.tau_min[at] = limits.min()[at] - tau_own;
+            self.tau_max[at] = limits.max()[at] - tau_own;
         }
+    }
+
+    /// The torques that hold the fingers' own weight and their springs.
+    fn hold_up(&mut self) {
+        self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
+        self.state.add_spring_torque(&self.hand, self.tau_own.as_mut_slice());
     }
 
     /// Grasp map with its torque rows weighted, for the force optimiser.
@@ -375,9 +379,7 @@ impl DualStagePlanner {
         }
         let (qd_des, f_des) = (self.planner.qd_des(), self.config.gait.f_des);
         self.velocity_force.update(k, &scene, qd_des, f_des, &mut self.tau_free);
-        let n_joints = self.hand.n_joints();
-        for (i, tau) in self.tau_free.iter().enumerate() {
-            let at = k * n_joints + i;
+        for (at, tau) in self.hand.joints(k).zip(&self.tau_free) {
             self.command.tau[at] = tau + self.tau_own[at];
         }
     }

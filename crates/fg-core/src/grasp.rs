@@ -64,7 +64,7 @@ impl Grasp {
         Self {
             contacts: vec![none; n],
             G: DMatrix::zeros(6, 3 * n),
-            J: DMatrix::zeros(3 * n, n * hand.n_joints()),
+            J: DMatrix::zeros(3 * n, hand.n_q()),
             contact_force,
         }
     }
@@ -95,10 +95,10 @@ impl Grasp {
             contact.p_WC = p_WF + contact.n_W * hand.tip_radius(j);
             contact.R_WC = contact_frame(&contact.n_W);
         }
-        self.assemble(hand, state, X_WO);
+        self.assemble(state, X_WO);
     }
 
-    fn assemble(&mut self, hand: &HandModel, state: &HandState, X_WO: &Isometry3<f64>) {
+    fn assemble(&mut self, state: &HandState, X_WO: &Isometry3<f64>) {
         for (j, contact) in self.contacts.iter().enumerate() {
             let arm = contact.p_WC - X_WO.translation.vector;
             for axis in 0..3 {
@@ -110,11 +110,11 @@ impl Grasp {
                     self.G[(3 + r, column)] = moment[r];
                 }
             }
-            for i in 0..hand.n_joints() {
-                let v_W = state.jacobian_column(j, i, &contact.p_WC);
+            for at in state.joints(j) {
+                let v_W = state.jacobian_column(at, &contact.p_WC);
                 let v_C = contact.R_WC.tr_mul(&v_W);
                 for r in 0..3 {
-                    self.J[(3 * j + r, j * hand.n_joints() + i)] = v_C[r];
+                    self.J[(3 * j + r, at)] = v_C[r];
                 }
             }
         }

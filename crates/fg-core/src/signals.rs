@@ -28,12 +28,12 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// A measurement of `n_fingers` with `n_joints` each, all zero.
-    pub fn zeros(n_fingers: usize, n_joints: usize) -> Self {
+    /// A measurement of `n_fingers` with `n_q` joints in all, all zero.
+    pub fn zeros(n_fingers: usize, n_q: usize) -> Self {
         Self {
             t: 0.0,
-            q: DVector::zeros(n_fingers * n_joints),
-            tau: DVector::zeros(n_fingers * n_joints),
+            q: DVector::zeros(n_q),
+            tau: DVector::zeros(n_q),
             X_WO: Isometry3::identity(),
             tactile: vec![Tactile { p_FC: Vector3::zeros(), f_n: 0.0 }; n_fingers],
         }

@@ -1,7 +1,8 @@
 //! The joint torque controller: a PID around the motors at the faster torque rate, Section II.
 
-use crate::config::{ForceConfig, TorqueConfig};
+use crate::config::TorqueConfig;
 use crate::error::Error;
+use crate::hand::TorqueLimits;
 
 /// Drives measured joint torques to desired ones. One instance serves all joints.
 ///
@@ -10,7 +11,7 @@ use crate::error::Error;
 #[derive(Debug, Clone)]
 pub struct TorquePid {
     config: TorqueConfig,
-    tau_max: f64,
+    limits: TorqueLimits,
     dt: f64,
     integral: Vec<f64>,
     derivative: Vec<f64>,
@@ -18,13 +19,14 @@ pub struct TorquePid {
 }
 
 impl TorquePid {
-    /// A controller for `n` joints at the period `dt`, s.
-    pub fn new(n: usize, dt: f64, config: &TorqueConfig, force: &ForceConfig) -> Result<Self, Error> {
+    /// A controller for joints with `limits` at the period `dt`, s.
+    pub fn new(limits: TorqueLimits, dt: f64, config: &TorqueConfig) -> Result<Self, Error> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(Error::config("dt", "a period > 0 s", dt));
         }
+        let n = limits.n();
         let (integral, derivative, previous) = (vec![0.0; n], vec![0.0; n], vec![None; n]);
-        Ok(Self { config: config.clone(), tau_max: force.tau_max, dt, integral, derivative, previous })
+        Ok(Self { config: config.clone(), limits, dt, integral, derivative, previous })
     }
 
     /// Number of joints.
@@ -55,9 +57,10 @@ impl TorquePid {
 
     fn joint(&mut self, i: usize, tau_des: f64, tau: f64) -> f64 {
         let c = &self.config;
-        let limit = self.tau_max;
+        let (min, max) = (self.limits.min()[i], self.limits.max()[i]);
+        let limit = max.max(-min);
         // A command that is not finite commands nothing.
-        let tau_des = if tau_des.is_finite() { tau_des.clamp(-limit, limit) } else { 0.0 };
+        let tau_des = if tau_des.is_finite() { tau_des.clamp(min, max) } else { 0.0 };
         if !tau.is_finite() {
             self.previous[i] = None;
             return tau_des;
@@ -69,7 +72,7 @@ impl TorquePid {
         self.derivative[i] = memory * self.derivative[i] + (1.0 - memory) * rate;
         let integral = self.integral[i] + c.K_i * e * self.dt;
         let wanted = tau_des + c.K_p * e + integral + c.K_d * self.derivative[i];
-        let motor = wanted.clamp(-limit, limit);
+        let motor = wanted.clamp(min, max);
         if (wanted - motor) * e <= 0.0 {
             self.integral[i] = integral.clamp(-limit, limit);
         }
@@ -82,7 +85,7 @@ mod tests {
     use super::*;
 
     fn pid(n: usize) -> TorquePid {
-        TorquePid::new(n, 1e-3, &TorqueConfig::default(), &ForceConfig::default()).unwrap()
+        TorquePid::new(TorqueLimits::uniform(n, 0.5).unwrap(), 1e-3, &TorqueConfig::default()).unwrap()
     }
 
     #[test]

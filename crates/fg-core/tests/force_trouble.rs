@@ -166,7 +166,7 @@ fn wrong_shapes_are_refused_by_name() {
         assert!(matches!(error, Error::Shape { .. }) && error.to_string().starts_with(field), "{error}");
     }
     let pyramid = FrictionPyramid::inscribed(0.5, 4).unwrap();
-    for n in [0, 6] {
+    for n in [0, 7] {
         assert!(ForceOptimizer::new(&vec![pyramid.clone(); n], 9, ForceSettings::default()).is_err());
     }
     for alpha in [[0.0, 0.0, 1.0], [-1.0, 2.0, 1.0], [1.0, 1.0, f64::NAN]] {

@@ -9,7 +9,7 @@ mod recording;
 mod chaos;
 
 use fg_core::config::{Config, QualityPlane};
-use fg_core::hand::HandModel;
+use fg_core::hand::{HandModel, TorqueLimits};
 use fg_core::manipulation::force::SolverChoice;
 use fg_core::manipulation::robust::Controller;
 use fg_core::safety::SafeMode;
@@ -77,7 +77,8 @@ fn config() -> impl Strategy<Value = Config> {
     (gait, force, other).prop_map(|(gait, force, other)| {
         let mut c = Config::default();
         (c.gait.w1, c.gait.w2, c.gait.sigma, c.gait.unload_time, c.gait.project_rate_box) = gait;
-        (c.force.alpha1, c.force.alpha3, c.force.friction, c.force.edges, c.force.tau_max) = force;
+        (c.force.alpha1, c.force.alpha3, c.force.friction, c.force.edges, _) = force;
+        c.force.tau_max = Some(force.4);
         (c.force.f_n_max, c.gait.K_v, c.robust.anti_windup, c.robust.prefilter, c.force.tau_rate_max) = other;
         c.gait.K_v = c.gait.K_v.min(100.0);
         c.gait.plane = if c.robust.prefilter { QualityPlane::Object } else { QualityPlane::Contacts };
@@ -133,12 +134,12 @@ proptest! {
     fn motor_torques_are_limited(
         tau in prop::collection::vec(prop::array::uniform2(prop::num::f64::ANY), 1..200),
     ) {
-        let config = Config::default();
-        let mut pid = TorquePid::new(1, 1e-3, &config.torque, &config.force).unwrap();
+        let limits = TorqueLimits::new(&[-0.2], &[0.5], None).unwrap();
+        let mut pid = TorquePid::new(limits, 1e-3, &Config::default().torque).unwrap();
         let mut motor = [0.0];
         for [desired, measured] in tau {
             pid.step(&[desired], &[measured], &mut motor).unwrap();
-            prop_assert!(motor[0].abs() <= config.force.tau_max);
+            prop_assert!(motor[0] >= -0.2 && motor[0] <= 0.5);
         }
     }
 

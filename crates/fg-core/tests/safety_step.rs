@@ -257,7 +257,7 @@ fn no_order_of_calls_panics() {
     let (first, reference) = recording.rows[0].clone();
     for k in [0, 2000, 3000, 5, 5, 1000, 0] {
         planner.step(&empty, &reference).unwrap_err();
-        planner.step(&Measurement::zeros(4, 3), &reference).unwrap();
+        planner.step(&Measurement::zeros(4, 12), &reference).unwrap();
         planner.step(&recording.rows[k].0, &recording.rows[k].1).unwrap();
         planner.step(&first, &reference).unwrap();
         if k == 5 {

@@ -14,7 +14,7 @@ fn counts(solver: SolverChoice, tau_max: Option<f64>) -> (SolverCounters, u64) {
     let recording = Recording::parse(ROTATE);
     let mut planner = recording.planner_with(|config| {
         config.force.solver = solver;
-        config.force.tau_max = tau_max.unwrap_or(config.force.tau_max);
+        config.force.tau_max = tau_max.or(config.force.tau_max);
     });
     let mut held = 0;
     for (measurement, reference) in &recording.rows[..400] {

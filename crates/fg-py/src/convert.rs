@@ -89,6 +89,48 @@ pub fn array2(
     Array2::from_shape_fn(shape, |(r, c)| at(r, c)).into_pyarray(py)
 }
 
+/// The numbers of an array over the joints of fingers with `counts` joints: (n_q,), or (n_fingers, n_joints) where all
+/// fingers have as many.
+pub fn joint_values(
+    field: &str,
+    array: &PyArrayLikeDyn<'_, f64, AllowTypeChange>,
+    counts: &[usize],
+) -> PyResult<Vec<f64>> {
+    let shape = joint_shape(counts);
+    let flat = [counts.iter().sum::<usize>()];
+    if array.shape() != shape && array.shape() != flat {
+        let found = tuple(array.shape());
+        return Err(to_py(Error::shape(field, tuple(&shape), found)));
+    }
+    Ok(array.as_array().iter().copied().collect())
+}
+
+/// A new array over the joints of fingers with `counts` joints: (n_fingers, n_joints) where all have as many, else (n_q,).
+pub fn joint_array<'py>(
+    py: Python<'py>,
+    counts: &[usize],
+    values: &[f64],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    array1(py, values).reshape(joint_shape(counts))
+}
+
+/// (n_fingers, n_joints) where all fingers have as many joints, else (n_q,).
+fn joint_shape(counts: &[usize]) -> Vec<usize> {
+    if counts.iter().all(|count| *count == counts[0]) {
+        vec![counts.len(), counts[0]]
+    } else {
+        vec![counts.iter().sum()]
+    }
+}
+
+/// A shape as Python writes it.
+pub fn tuple(shape: &[usize]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// A new array of the shape of `pattern`.
 pub fn like<'py>(
     py: Python<'py>,

@@ -1,21 +1,41 @@
 //! `HandModel`.
 
-use crate::convert::{array2, flat, point};
+use crate::convert::{array1, array2, joint_array, joint_values, point};
 use crate::errors::to_py;
-use fg_core::hand::{HandModel as Core, HandState};
-use numpy::{AllowTypeChange, PyArray2, PyArrayLike1, PyArrayLike2};
+use fg_core::error::Error;
+use fg_core::hand::{Coordinate, HandModel as Core, HandState};
+use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayDyn, PyArrayLike1, PyArrayLikeDyn};
 use pyo3::prelude::*;
+use pyo3::types::PySlice;
 
 /// Kinematics of a hand, from the JSON that `fingergait.hand` derives from an MJCF.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct HandModel(pub Core);
 
 impl HandModel {
-    fn state(&self, q: &PyArrayLike2<'_, f64, AllowTypeChange>) -> PyResult<HandState> {
-        let q = flat("q", q, (self.0.n_fingers(), self.0.n_joints()))?;
+    fn state(&self, q: &PyArrayLikeDyn<'_, f64, AllowTypeChange>) -> PyResult<HandState> {
+        let q = joint_values("q", q, &self.0.counts())?;
         let mut state = HandState::new(&self.0);
         state.update(&self.0, &q);
         Ok(state)
+    }
+
+    /// A figure of every independent joint.
+    fn each<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&Coordinate) -> f64,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let values: Vec<_> = self.0.coordinates().iter().map(of).collect();
+        joint_array(py, &self.0.counts(), &values)
+    }
+
+    fn check(&self, finger: usize) -> PyResult<()> {
+        let n = self.0.n_fingers();
+        if finger < n {
+            return Ok(());
+        }
+        Err(to_py(Error::config("finger", format!("0 to {}", n - 1), finger)))
     }
 }
 
@@ -31,17 +51,69 @@ impl HandModel {
         self.0.n_fingers()
     }
 
-    /// Joints of one finger.
+    /// Independent joints of all fingers.
     #[getter]
-    fn n_joints(&self) -> usize {
-        self.0.n_joints()
+    fn n_q(&self) -> usize {
+        self.0.n_q()
     }
 
-    /// Centres of the fingertips in W, (n_fingers, 3), at joint angles q (n_fingers, n_joints).
+    /// Independent joints of one finger: a number where all have as many, else one number for each finger.
+    #[getter]
+    fn n_joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let counts = self.0.counts();
+        if counts.iter().all(|count| *count == counts[0]) {
+            return Ok(counts[0].into_pyobject(py)?.into_any());
+        }
+        Ok(counts.into_pyobject(py)?.into_any())
+    }
+
+    /// Where the independent joints of `finger` are in a flat array (n_q,).
+    fn joints<'py>(&self, py: Python<'py>, finger: usize) -> PyResult<Bound<'py, PySlice>> {
+        self.check(finger)?;
+        let range = self.0.joints(finger);
+        let end = |at: usize| isize::try_from(at).unwrap_or(isize::MAX);
+        Ok(PySlice::new(py, end(range.start), end(range.end), 1))
+    }
+
+    /// Lower and upper limits of the independent joints, rad.
+    #[getter]
+    #[allow(clippy::type_complexity, reason = "two arrays")]
+    fn limits<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        Ok((self.each(py, |joint| joint.lower)?, self.each(py, |joint| joint.upper)?))
+    }
+
+    /// Least torques that the model states, N m; NaN where it states none.
+    #[getter]
+    fn tau_min<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.each(py, |joint| joint.tau_min.unwrap_or(f64::NAN))
+    }
+
+    /// Largest torques that the model states, N m; NaN where it states none.
+    #[getter]
+    fn tau_max<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.each(py, |joint| joint.tau_max.unwrap_or(f64::NAN))
+    }
+
+    /// The posture that the joints should return to, rad.
+    #[getter]
+    fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.each(py, |joint| joint.reference)
+    }
+
+    /// Acceleration of gravity in W, (3,), m/s^2.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array1(py, self.0.gravity().as_slice())
+    }
+
+    /// Centres of the fingertips in W, (n_fingers, 3), at joint angles q.
     fn tip_positions<'py>(
         &self,
         py: Python<'py>,
-        q: PyArrayLike2<'py, f64, AllowTypeChange>,
+        q: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let state = self.state(&q)?;
         let n = self.0.n_fingers();
@@ -52,28 +124,37 @@ impl HandModel {
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
-        q: PyArrayLike2<'py, f64, AllowTypeChange>,
+        q: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
         finger: usize,
         point: PyArrayLike1<'py, f64, AllowTypeChange>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (state, p_W) = (self.state(&q)?, self::point("point", &point)?);
-        if finger >= self.0.n_fingers() {
-            let expected = format!("0 to {}", self.0.n_fingers() - 1);
-            return Err(to_py(fg_core::error::Error::config("finger", expected, finger)));
-        }
+        self.check(finger)?;
         let J = state.jacobian(finger, &p_W);
-        Ok(array2(py, (3, self.0.n_joints()), |r, c| J[(r, c)]))
+        Ok(array2(py, J.shape(), |r, c| J[(r, c)]))
     }
 
-    /// Torques (n_fingers, n_joints) that hold the fingers' own weight.
+    /// Torques that hold the fingers' own weight, N m.
     fn gravity_torque<'py>(
         &self,
         py: Python<'py>,
-        q: PyArrayLike2<'py, f64, AllowTypeChange>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (state, n_joints) = (self.state(&q)?, self.0.n_joints());
-        let mut tau = vec![0.0; self.0.n_fingers() * n_joints];
+        q: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let state = self.state(&q)?;
+        let mut tau = vec![0.0; self.0.n_q()];
         state.gravity_torque(&self.0, &mut tau);
-        Ok(array2(py, (self.0.n_fingers(), n_joints), |j, i| tau[j * n_joints + i]))
+        joint_array(py, &self.0.counts(), &tau)
+    }
+
+    /// Torques that hold the joints' springs, N m.
+    fn spring_torque<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyArrayLikeDyn<'py, f64, AllowTypeChange>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let state = self.state(&q)?;
+        let mut tau = vec![0.0; self.0.n_q()];
+        state.add_spring_torque(&self.0, &mut tau);
+        joint_array(py, &self.0.counts(), &tau)
     }
 }

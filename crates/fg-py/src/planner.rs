@@ -1,16 +1,20 @@
 //! `DualStagePlanner` with its signals.
 
 use crate::controller::Controller;
-use crate::convert::{array1, array2, flat, pose, sensed_pose, vector};
+use crate::convert::{array1, flat, joint_array, pose, sensed_pose, tuple, vector};
 use crate::cpu_clock::ThreadClock;
 use crate::errors::to_py;
 use crate::hand::HandModel;
 use fg_core::config::Config;
 use fg_core::diagnostics::Diagnostics as CoreDiagnostics;
 use fg_core::dual_stage::DualStagePlanner as Core;
+use fg_core::error::Error;
+use fg_core::hand::HandModel as CoreHand;
 use fg_core::signals::{Measurement as CoreMeasurement, Reference as CoreReference, Tactile};
 use nalgebra::{DVector, Vector3, Vector6};
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyUntypedArrayMethods};
+use numpy::{
+    AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2, PyArrayLikeDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -23,20 +27,30 @@ impl Measurement {
     #[new]
     fn new(
         t: f64,
-        q: PyArrayLike2<'_, f64, AllowTypeChange>,
-        tau: PyArrayLike2<'_, f64, AllowTypeChange>,
+        q: PyArrayLikeDyn<'_, f64, AllowTypeChange>,
+        tau: PyArrayLikeDyn<'_, f64, AllowTypeChange>,
         pose: PyArrayLike1<'_, f64, AllowTypeChange>,
         contact_place: PyArrayLike2<'_, f64, AllowTypeChange>,
         contact_force: PyArrayLike1<'_, f64, AllowTypeChange>,
     ) -> PyResult<Self> {
-        let shape = (q.shape()[0], q.shape()[1]);
-        let place = flat("contact_place", &contact_place, (shape.0, 3))?;
-        let force = vector("contact_force", &contact_force, shape.0)?;
+        // A flat q does not tell the number of fingers.
+        let n = match q.shape() {
+            [n, _] => *n,
+            [_] => contact_force.shape()[0],
+            other => {
+                return Err(to_py(Error::shape("q", "(n_fingers, n_joints) or (n_q,)", tuple(other))));
+            }
+        };
+        if tau.shape() != q.shape() {
+            return Err(to_py(Error::shape("tau", tuple(q.shape()), tuple(tau.shape()))));
+        }
+        let place = flat("contact_place", &contact_place, (n, 3))?;
+        let force = vector("contact_force", &contact_force, n)?;
         let tactile = place.chunks_exact(3).zip(force);
         Ok(Self(CoreMeasurement {
             t,
-            q: DVector::from_vec(flat("q", &q, shape)?),
-            tau: DVector::from_vec(flat("tau", &tau, shape)?),
+            q: DVector::from_iterator(q.len(), q.as_array().iter().copied()),
+            tau: DVector::from_iterator(tau.len(), tau.as_array().iter().copied()),
             X_WO: sensed_pose("pose", &pose)?,
             tactile: tactile.map(|(p, f_n)| Tactile { p_FC: Vector3::new(p[0], p[1], p[2]), f_n }).collect(),
         }))
@@ -67,17 +81,23 @@ impl Reference {
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct Command {
     tau: DVector<f64>,
-    n_joints: usize,
+    counts: Vec<usize>,
 }
 
 #[pymethods]
 impl Command {
-    /// Desired joint torques, (n_fingers, n_joints), N m.
+    /// Desired joint torques, N m: (n_fingers, n_joints) where all fingers have as many joints, else (n_q,).
     #[getter]
-    fn tau<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let n = self.n_joints;
-        array2(py, (self.tau.len() / n, n), |j, i| self.tau[j * n + i])
+    fn tau<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        joint_array(py, &self.counts, self.tau.as_slice())
     }
+}
+
+/// Number of joints of all fingers, or of each.
+#[derive(FromPyObject)]
+enum Counts {
+    All(usize),
+    Each(Vec<usize>),
 }
 
 /// What the step decided and why.
@@ -164,10 +184,23 @@ impl Diagnostics {
         self.step_allocations
     }
 
-    /// Names of the numbers that `row` gives, in order.
+    /// Names of the numbers that `row` gives, in order. `n_joints` is that of each finger, or one number for all.
     #[staticmethod]
-    fn columns(n_fingers: usize, n_joints: usize) -> Vec<String> {
-        CoreDiagnostics::columns(n_fingers, n_joints)
+    fn columns(n_fingers: usize, n_joints: Counts) -> PyResult<Vec<String>> {
+        let counts = match n_joints {
+            Counts::All(n_joints) => vec![n_joints; n_fingers.min(CoreHand::MAX_FINGERS)],
+            Counts::Each(counts) => counts,
+        };
+        let (most, each) = (CoreHand::MAX_FINGERS, CoreHand::MAX_JOINTS);
+        if counts.len() != n_fingers || counts.is_empty() {
+            let expected = format!("a number for each of the fingers, 1 to {most}");
+            return Err(to_py(Error::config("n_joints", expected, format!("{}", counts.len()))));
+        }
+        if counts.len() > most || counts.iter().any(|count| *count > each) {
+            let expected = format!("up to {each} joints of up to {most} fingers");
+            return Err(to_py(Error::config("n_joints", expected, format!("{counts:?}"))));
+        }
+        Ok(CoreDiagnostics::columns(&counts))
     }
 
     /// Every figure of this step as one row, for a log. Deterministic: holds no time measurement.
@@ -212,9 +245,9 @@ impl DualStagePlanner {
             (outcome.cloned(), ns, allocations)
         });
         let command = outcome.map_err(to_py)?;
-        let n_joints = self.0.hand().n_joints();
+        let counts = self.0.hand().counts();
         let diagnostics = Diagnostics { core: self.0.diagnostics().clone(), step_ns, step_allocations };
-        Ok((Command { tau: command.tau, n_joints }, diagnostics))
+        Ok((Command { tau: command.tau, counts }, diagnostics))
     }
 
     /// Returns to the state after construction.
@@ -230,7 +263,7 @@ pub fn default_config(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 }
 
 fn config_dict<'py>(py: Python<'py>, config: &Config) -> PyResult<Bound<'py, PyDict>> {
-    let json = serde_json::to_string(config)
-        .map_err(|e| to_py(fg_core::error::Error::config("config", "a configuration", e)))?;
+    let json =
+        serde_json::to_string(config).map_err(|e| to_py(Error::config("config", "a configuration", e)))?;
     Ok(py.import("json")?.call_method1("loads", (json,))?.cast_into::<PyDict>()?)
 }

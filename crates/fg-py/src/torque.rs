@@ -1,10 +1,12 @@
 //! `TorquePid`.
 
-use crate::convert::like;
+use crate::convert::{like, tuple};
 use crate::errors::to_py;
 use fg_core::config::Config;
+use fg_core::error::Error;
+use fg_core::hand::TorqueLimits;
 use fg_core::torque::TorquePid as Core;
-use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn};
+use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// Joint torque tracking at the faster torque rate.
@@ -17,10 +19,23 @@ pub struct TorquePid {
 #[pymethods]
 impl TorquePid {
     #[new]
-    #[pyo3(signature = (n_joints_total, dt, config=None))]
-    fn new(n_joints_total: usize, dt: f64, config: Option<&str>) -> PyResult<Self> {
-        let config = config.map_or_else(|| Ok(Config::default()), Config::from_json).map_err(to_py)?;
-        let core = Core::new(n_joints_total, dt, &config.torque, &config.force).map_err(to_py)?;
+    #[pyo3(signature = (n_joints_total, dt, config=None, tau_min=None, tau_max=None))]
+    fn new(
+        n_joints_total: usize,
+        dt: f64,
+        config: Option<&str>,
+        tau_min: Option<PyArrayLikeDyn<'_, f64, AllowTypeChange>>,
+        tau_max: Option<PyArrayLikeDyn<'_, f64, AllowTypeChange>>,
+    ) -> PyResult<Self> {
+        let config = match config {
+            Some(config) => Config::from_json(config).map_err(to_py)?,
+            None => paper(tau_min.is_none() || tau_max.is_none()),
+        };
+        let cap = config.force.tau_max;
+        let min = limits("tau_min", tau_min, n_joints_total, cap.map(|cap| -cap))?;
+        let max = limits("tau_max", tau_max, n_joints_total, cap)?;
+        let limits = TorqueLimits::new(&min, &max, cap).map_err(to_py)?;
+        let core = Core::new(limits, dt, &config.torque).map_err(to_py)?;
         Ok(Self { core, motor: vec![0.0; n_joints_total] })
     }
 
@@ -41,4 +56,30 @@ impl TorquePid {
     fn reset(&mut self) {
         self.core.reset();
     }
+}
+
+/// The default configuration, with the torque limit of the paper's hand where no other is given.
+fn paper(limited: bool) -> Config {
+    let mut config = Config::default();
+    config.force.tau_max = limited.then_some(0.5);
+    config
+}
+
+/// The limits given for `n` joints, in any shape, or `default` for each.
+fn limits(
+    field: &str,
+    given: Option<PyArrayLikeDyn<'_, f64, AllowTypeChange>>,
+    n: usize,
+    default: Option<f64>,
+) -> PyResult<Vec<f64>> {
+    let Some(given) = given else {
+        let missing =
+            || Error::config(field, "a torque for each joint, or force.tau_max in config", "neither");
+        return Ok(vec![default.ok_or_else(missing).map_err(to_py)?; n]);
+    };
+    if given.len() != n {
+        let found = tuple(given.shape());
+        return Err(to_py(Error::shape(field, format!("{n} torques"), found)));
+    }
+    Ok(given.as_array().iter().copied().collect())
 }

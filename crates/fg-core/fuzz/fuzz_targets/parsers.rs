@@ -14,7 +14,7 @@ fuzz_target!(|data: &[u8]| {
     }
     if let Ok(hand) = HandModel::from_json(&text) {
         let mut state = HandState::new(&hand);
-        state.update(&hand, &vec![0.1; hand.n_fingers() * hand.n_joints()]);
+        state.update(&hand, &vec![0.1; hand.n_q()]);
     }
     if let Ok(mut controller) = Controller::from_json(&text) {
         let e = nalgebra::Vector6::repeat(1e-3);

@@ -22,7 +22,7 @@ impl DualStagePlanner {
         self.velocity_force.reset(0.0);
         self.limiter.reset();
         self.command.tau.fill(0.0);
-        self.diagnostics = Diagnostics::new(self.hand.n_fingers(), self.hand.n_joints());
+        self.diagnostics = Diagnostics::new(&self.hand.counts());
         self.diagnostics.friction = self.friction.mu();
     }
 
@@ -32,7 +32,7 @@ impl DualStagePlanner {
         self.release();
         self.tau_own.fill(0.0);
         if self.guard.knows_joints() {
-            self.state.gravity_torque(&self.hand, self.tau_own.as_mut_slice());
+            self.hold_up();
         }
         for at in 0..self.tau_own.len() {
             self.fade(at);
@@ -68,21 +68,22 @@ impl DualStagePlanner {
 
     /// Lets go of fingers of which neither angles nor contact are known.
     pub(super) fn damp_fingers(&mut self) {
-        let n_joints = self.hand.n_joints();
-        for at in 0..self.command.tau.len() {
-            if self.guard.damps(at / n_joints) {
-                self.fade(at);
+        for j in 0..self.hand.n_fingers() {
+            if self.guard.damps(j) {
+                self.hand.joints(j).for_each(|at| self.fade(at));
             }
         }
     }
 
     /// Leaves fingers without power to their own weight, and tests their motors while there is something to see it by.
     pub(super) fn test_motors(&mut self) {
-        let (n_joints, blind) = (self.hand.n_joints(), self.guard.blind());
-        for at in 0..self.command.tau.len() {
-            if !self.guard.drives(at / n_joints) {
-                let test = self.guard.motor_test(at).filter(|_| !blind);
-                self.command.tau[at] = test.unwrap_or(self.tau_own[at]);
+        let blind = self.guard.blind();
+        for j in 0..self.hand.n_fingers() {
+            if !self.guard.drives(j) {
+                for at in self.hand.joints(j) {
+                    let test = self.guard.motor_test(j, at).filter(|_| !blind);
+                    self.command.tau[at] = test.unwrap_or(self.tau_own[at]);
+                }
             }
         }
     }

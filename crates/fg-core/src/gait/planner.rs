@@ -20,6 +20,9 @@ pub struct GaitRate {
 #[derive(Debug, Clone)]
 pub struct GaitPlanner {
     config: GaitConfig,
+    /// Number of joints of each finger, and of the one that `a` is of: the vectors below have room for the largest.
+    counts: Vec<usize>,
+    n: usize,
     /// Largest change of a joint velocity in one step, rad/s.
     sigma: f64,
     /// Desired joint velocities of the free finger, rad/s: qd_des,k.
@@ -34,11 +37,13 @@ pub struct GaitPlanner {
 impl GaitPlanner {
     /// A planner for `hand` at the control period `dt`.
     pub fn new(hand: &HandModel, config: &GaitConfig, dt: f64) -> Self {
-        let zeros = vec![0.0; hand.n_joints()];
+        let zeros = vec![0.0; hand.most_joints()];
         Self {
             // The paper's sigma belongs to its 2 ms; sigma / T_s is the acceleration limit that is meant.
             sigma: config.sigma * dt / 0.002,
             config: config.clone(),
+            counts: hand.counts(),
+            n: 0,
             qd_des: zeros.clone(),
             c: zeros.clone(),
             a: zeros.clone(),
@@ -48,7 +53,7 @@ impl GaitPlanner {
         }
     }
 
-    /// Desired joint velocities of the free finger, rad/s.
+    /// Desired joint velocities of the free finger, rad/s; zero behind its last joint, where other fingers have more.
     pub fn qd_des(&self) -> &[f64] {
         &self.qd_des
     }
@@ -64,10 +69,12 @@ impl GaitPlanner {
     /// finger, instead of zero; a finger that has lost the surface moves towards it at the approach speed. The tangential
     /// part of qd is what the LP finds; the normal part is the smallest that follows the surface.
     pub fn update(&mut self, k: usize, quality: &QualityModel, scene: &Scene<'_>) -> GaitRate {
-        quality.rate_coefficients(k, scene, &self.qd_des, &mut self.c);
         self.constrain_to_surface(k, scene);
+        let n = self.n;
+        quality.rate_coefficients(k, scene, &self.qd_des[..n], &mut self.c[..n]);
         self.rate_box();
-        let outcome = gait_lp(&self.c, &self.a, &self.lower, &self.upper, &mut self.qd_des);
+        let outcome =
+            gait_lp(&self.c[..n], &self.a[..n], &self.lower[..n], &self.upper[..n], &mut self.qd_des[..n]);
         self.follow_surface(k, scene);
         GaitRate { Q_dot: outcome.value, feasible: outcome.feasible }
     }
@@ -85,29 +92,31 @@ impl GaitPlanner {
         let surface = linear(scene.V_WD) + angular(scene.V_WD).cross(&arm);
         let follow = if self.config.follow_surface { contact.n_W.dot(&surface) } else { 0.0 };
         let approach = if contact.touching { 0.0 } else { self.config.approach_speed };
-        let aa: f64 = self.a.iter().map(|a| a * a).sum();
+        let aa: f64 = self.a[..self.n].iter().map(|a| a * a).sum();
         let scale = if aa > 1e-12 { (follow + approach) / aa } else { 0.0 };
         let limit = self.config.qd_max;
-        for (qd, a) in self.qd_des.iter_mut().zip(&self.a) {
+        for (qd, a) in self.qd_des.iter_mut().zip(&self.a[..self.n]) {
             *qd = (*qd + a * scale).clamp(-limit, limit);
         }
     }
 
     /// The best Q-dot that finger `k` could reach without the acceleration limit: what freeing it promises, 1/s.
     pub fn potential(&mut self, k: usize, quality: &QualityModel, scene: &Scene<'_>) -> f64 {
-        self.centre.fill(0.0);
-        quality.rate_coefficients(k, scene, &self.centre, &mut self.c);
         self.constrain_to_surface(k, scene);
+        let n = self.n;
+        self.centre.fill(0.0);
+        quality.rate_coefficients(k, scene, &self.centre[..n], &mut self.c[..n]);
         self.lower.fill(-self.config.qd_max);
         self.upper.fill(self.config.qd_max);
-        gait_lp(&self.c, &self.a, &self.lower, &self.upper, &mut self.centre).value
+        gait_lp(&self.c[..n], &self.a[..n], &self.lower[..n], &self.upper[..n], &mut self.centre[..n]).value
     }
 
     /// The row n_pk^T J of (4c).
     fn constrain_to_surface(&mut self, k: usize, scene: &Scene<'_>) {
         let contact = scene.grasp.contact(k);
-        for (i, a) in self.a.iter_mut().enumerate() {
-            *a = contact.n_W.dot(&scene.state.jacobian_column(k, i, &contact.p_WC));
+        self.n = self.counts[k];
+        for (at, a) in scene.state.joints(k).zip(&mut self.a) {
+            *a = contact.n_W.dot(&scene.state.jacobian_column(at, &contact.p_WC));
         }
     }
 
@@ -116,10 +125,11 @@ impl GaitPlanner {
     fn rate_box(&mut self) {
         self.centre.copy_from_slice(&self.qd_des);
         if self.config.project_rate_box {
-            let aa: f64 = self.a.iter().map(|a| a * a).sum();
-            let av: f64 = self.a.iter().zip(&self.qd_des).map(|(a, v)| a * v).sum();
+            let a = &self.a[..self.n];
+            let aa: f64 = a.iter().map(|a| a * a).sum();
+            let av: f64 = a.iter().zip(&self.qd_des).map(|(a, v)| a * v).sum();
             if aa > 1e-12 {
-                for (centre, a) in self.centre.iter_mut().zip(&self.a) {
+                for (centre, a) in self.centre.iter_mut().zip(a) {
                     *centre -= a * av / aa;
                 }
             }

@@ -4,6 +4,7 @@ use crate::config::{GaitConfig, QualityPlane};
 use crate::grasp::{Grasp, Scene};
 use crate::hand::HandModel;
 use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Unit, Vector2, Vector3};
+use std::ops::Range;
 
 /// The qualities of a grasp at one instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -33,9 +34,13 @@ struct Projection {
 #[derive(Debug, Clone)]
 pub struct QualityModel {
     config: GaitConfig,
-    middle: Vec<f64>,
+    /// Of each joint: the posture it should return to, rad, its range, and how far it can turn below and above that posture.
+    reference: Vec<f64>,
     range: Vec<f64>,
-    n_joints: usize,
+    reach: Vec<[f64; 2]>,
+    joints: Vec<Range<usize>>,
+    /// Against gravity, in W.
+    up: Vector3<f64>,
     /// Normal of the quality plane and mean contact height along it, in the object's frame, from the first grasp.
     plane: Option<(Unit<Vector3<f64>>, f64)>,
 }
@@ -43,9 +48,16 @@ pub struct QualityModel {
 impl QualityModel {
     /// The quality of grasps of `hand` under `config`.
     pub fn new(hand: &HandModel, config: &GaitConfig) -> Self {
-        let limits = (0..hand.n_fingers()).flat_map(|j| (0..hand.n_joints()).map(move |i| hand.limits(j, i)));
-        let (middle, range) = limits.map(|(low, high)| (0.5 * (low + high), high - low)).unzip();
-        Self { config: config.clone(), middle, range, n_joints: hand.n_joints(), plane: None }
+        let joints = hand.coordinates();
+        Self {
+            config: config.clone(),
+            reference: joints.iter().map(|c| c.reference).collect(),
+            range: joints.iter().map(|c| c.upper - c.lower).collect(),
+            reach: joints.iter().map(|c| [c.reference - c.lower, c.upper - c.reference]).collect(),
+            joints: (0..hand.n_fingers()).map(|j| hand.joints(j)).collect(),
+            up: hand.up(),
+            plane: None,
+        }
     }
 
     /// Forgets the first grasp.
@@ -56,7 +68,7 @@ impl QualityModel {
     /// Takes the present contacts as the first grasp: it fixes the plane's normal and the mean height in the object.
     pub fn set_first_grasp(&mut self, scene: &Scene<'_>) {
         let Scene { grasp, X_WO, .. } = *scene;
-        let n_W = best_fit_normal(grasp, |_| true);
+        let n_W = best_fit_normal(grasp, &self.up, |_| true);
         let n_O = X_WO.rotation.inverse() * n_W;
         let sum: f64 = (0..grasp.contacts().len()).map(|j| height(grasp, j, X_WO, &n_O)).sum();
         self.plane = Some((n_O, sum / grasp.contacts().len() as f64));
@@ -69,8 +81,8 @@ impl QualityModel {
 
     /// Manipulability of finger `j` at the joint angles `q` of all fingers: its summand of Q_h.
     pub fn manipulability(&self, j: usize, q: &[f64]) -> f64 {
-        let joints = j * self.n_joints..(j + 1) * self.n_joints;
-        -0.5 * joints.map(|i| ((q[i] - self.middle[i]) / self.range[i]).powi(2)).sum::<f64>()
+        let joints = self.joints[j].clone();
+        -0.5 * joints.map(|at| ((q[at] - self.reference[at]) / self.range[at]).powi(2)).sum::<f64>()
     }
 
     /// Q of the grasp with all fingers, eq. (1).
@@ -91,21 +103,20 @@ impl QualityModel {
         let Scene { grasp, state, X_WO, q, .. } = *scene;
         let p_WC = grasp.contact(k).p_WC;
         let area_gradient = self.project(scene, Some(k)).gradient(k);
-        for (i, c) in c.iter_mut().enumerate() {
-            let at = k * self.n_joints + i;
-            let column = state.jacobian_column(k, i, &p_WC);
-            let (middle, range) = (self.middle[at], self.range[at]);
-            let weight = limit_weight(q[at] - middle, range, self.config.q_thres);
-            let posture = weight * (middle - q[at]) / (range * range);
+        for (at, c) in self.joints[k].clone().zip(c.iter_mut()) {
+            let column = state.jacobian_column(at, &p_WC);
+            let (d, range) = (q[at] - self.reference[at], self.range[at]);
+            let reach = self.reach[at][usize::from(d > 0.0)];
+            let posture = -limit_weight(d, reach, range, self.config.q_thres) * d / (range * range);
             *c = self.config.w1 * area_gradient.dot(&column) + self.config.w2 * posture;
         }
         let Some((n_O, _)) = self.plane else { return };
         let n_W = X_WO.rotation * n_O.into_inner();
-        let climb = |i: usize| n_W.dot(&state.jacobian_column(k, i, &p_WC));
-        let h_dot: f64 = qd.iter().enumerate().map(|(i, qd)| climb(i) * qd).sum();
+        let climb = |at: usize| n_W.dot(&state.jacobian_column(at, &p_WC));
+        let h_dot: f64 = self.joints[k].clone().zip(qd).map(|(at, qd)| climb(at) * qd).sum();
         let h = self.height_error(scene, k) + self.config.height_horizon * h_dot;
-        for (i, c) in c.iter_mut().enumerate() {
-            *c -= self.config.w_z * h * climb(i);
+        for (at, c) in self.joints[k].clone().zip(c.iter_mut()) {
+            *c -= self.config.w_z * h * climb(at);
         }
     }
 
@@ -113,7 +124,7 @@ impl QualityModel {
         let Scene { grasp, X_WO, .. } = *scene;
         let normal = match (self.config.plane, self.plane) {
             (QualityPlane::Object, Some((n_O, _))) => X_WO.rotation * n_O,
-            _ => best_fit_normal(grasp, |j| Some(j) != free),
+            _ => best_fit_normal(grasp, &self.up, |j| Some(j) != free),
         };
         Projection::new(grasp, &normal)
     }
@@ -124,21 +135,25 @@ fn height(grasp: &Grasp, j: usize, X_WO: &Isometry3<f64>, n_O: &Unit<Vector3<f64
     (X_WO.rotation * n_O.into_inner()).dot(&(grasp.contact(j).p_WC - X_WO.translation.vector))
 }
 
-/// The weighting function c_k^i of eq. (3) at distance `d` from the joint's middle, `range` = q_max - q_min.
+/// The weighting function c_k^i of eq. (3) at distance `d` from the joint's reference, from where the limit on that side is
+/// `reach` away; `range` = q_max - q_min.
 ///
-/// Deviation: within 1e-3 of the range of a limit the logarithm is held, so that it stays finite at and past the limit.
-fn limit_weight(d: f64, range: f64, threshold_fraction: f64) -> f64 {
-    let half = 0.5 * range;
-    let threshold = threshold_fraction * half;
+/// Deviation: the paper's reference is the middle of the range, with the same reach on both sides. Within 1e-3 of the range
+/// of a limit the logarithm is held, so that it stays finite at and past the limit.
+fn limit_weight(d: f64, reach: f64, range: f64, threshold_fraction: f64) -> f64 {
+    let threshold = threshold_fraction * reach;
     if d.abs() <= threshold {
         return 1.0;
     }
-    let to_limit = (half - d.abs()).max(1e-3 * range);
-    ((half - threshold) / to_limit).ln() + 1.0
+    let least = 1e-3 * range;
+    let to_limit = (reach - d.abs()).max(least);
+    ((reach - threshold).max(least) / to_limit).ln() + 1.0
 }
 
-/// Unit normal of the plane that fits the chosen contacts best, on the side of world z.
-fn best_fit_normal(grasp: &Grasp, chosen: impl Fn(usize) -> bool) -> Unit<Vector3<f64>> {
+/// Unit normal of the plane that fits the chosen contacts best, on the side of `up`; `up` itself where they fix no plane.
+///
+/// Where the plane holds `up`, the side is that of the computed normal: Q_o and its gradient are the same for both.
+fn best_fit_normal(grasp: &Grasp, up: &Vector3<f64>, chosen: impl Fn(usize) -> bool) -> Unit<Vector3<f64>> {
     let points = || grasp.contacts().iter().enumerate().filter(|(j, _)| chosen(*j)).map(|(_, c)| c.p_WC);
     let count = points().count();
     let mean = points().sum::<Vector3<f64>>() / count.max(1) as f64;
@@ -146,16 +161,16 @@ fn best_fit_normal(grasp: &Grasp, chosen: impl Fn(usize) -> bool) -> Unit<Vector
         let mut p = points();
         match (p.next(), p.next(), p.next()) {
             (Some(a), Some(b), Some(c)) => (b - a).cross(&(c - a)),
-            _ => Vector3::z(),
+            _ => *up,
         }
     } else {
         let scatter: Matrix3<f64> = points().map(|p| (p - mean) * (p - mean).transpose()).sum();
         // Bounded: a control step never iterates until it converges.
         SymmetricEigen::try_new(scatter, f64::EPSILON, 64)
-            .map_or(Vector3::z(), |eigen| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned())
+            .map_or(*up, |eigen| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned())
     };
-    let normal = Unit::try_new(normal, 1e-12).unwrap_or(Vector3::z_axis());
-    if normal.z < 0.0 {
+    let normal = Unit::try_new(normal, 1e-12).unwrap_or(Unit::new_unchecked(*up));
+    if normal.dot(up) < 0.0 {
         -normal
     } else {
         normal
@@ -173,9 +188,9 @@ impl Projection {
             *point = Vector2::new(x.dot(&contact.p_WC), y.dot(&contact.p_WC));
         }
         let mean = points[..n].iter().sum::<Vector2<f64>>() / n as f64;
-        let mut order = [0, 1, 2, 3, 4];
+        let mut order = std::array::from_fn(|j| j);
         let angle = |j: usize| (points[j].y - mean.y).atan2(points[j].x - mean.x);
-        // Insertion sort: n <= 5, and ties keep the fingers' own order.
+        // Insertion sort: n <= 6, and ties keep the fingers' own order.
         for i in 1..n {
             let mut at = i;
             while at > 0 && angle(order[at - 1]) > angle(order[at]) {
@@ -225,13 +240,17 @@ mod tests {
     #[test]
     fn limit_weight_is_one_in_the_middle_and_continuous() {
         for d in [-0.2, 0.0, 0.2] {
-            assert!((limit_weight(d, 1.0, 0.5) - 1.0).abs() < 1e-15);
+            assert!((limit_weight(d, 0.5, 1.0, 0.5) - 1.0).abs() < 1e-15);
         }
         for d in [0.25 + 1e-12, -0.25 - 1e-12] {
-            assert!((limit_weight(d, 1.0, 0.5) - 1.0).abs() < 1e-9);
+            assert!((limit_weight(d, 0.5, 1.0, 0.5) - 1.0).abs() < 1e-9);
         }
         // The paper's formula: ln((q_max - q_bar - q_thres) / (q_max - q)) + 1.
-        assert!((limit_weight(0.4, 1.0, 0.5) - ((0.25_f64 / 0.1).ln() + 1.0)).abs() < 1e-12);
-        assert!(limit_weight(0.6, 1.0, 0.5).is_finite());
+        assert!((limit_weight(0.4, 0.5, 1.0, 0.5) - ((0.25_f64 / 0.1).ln() + 1.0)).abs() < 1e-12);
+        assert!(limit_weight(0.6, 0.5, 1.0, 0.5).is_finite());
+        // A reference at a limit: nothing to turn on that side.
+        for d in [0.0, 1e-6, 0.2] {
+            assert!((limit_weight(d, 0.0, 1.0, 0.5) - 1.0).abs() < 1e-15);
+        }
     }
 }

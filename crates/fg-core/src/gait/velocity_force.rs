@@ -30,15 +30,15 @@ impl VelocityForceController {
         self.f_act
     }
 
-    /// Writes tau_des,k = K_v qd_des + K_f J^T (f_des - f_act) n for finger `k`, N m.
+    /// Writes tau_des,k = K_v qd_des + K_f J^T (f_des - f_act) n for the joints of finger `k`, N m.
     ///
     /// The force term pushes along the inward normal. Its static force is f_des K_f / (1 + K_f), as in the paper.
     pub fn update(&mut self, k: usize, scene: &Scene<'_>, qd_des: &[f64], f_des: f64, tau: &mut [f64]) {
         let contact = scene.grasp.contact(k);
         self.f_act = self.memory * self.f_act + (1.0 - self.memory) * contact.f_n;
         let push = self.config.K_f * (f_des - self.f_act);
-        for (i, (tau, qd_des)) in tau.iter_mut().zip(qd_des).enumerate() {
-            let column = scene.state.jacobian_column(k, i, &contact.p_WC);
+        for ((at, tau), qd_des) in scene.state.joints(k).zip(tau).zip(qd_des) {
+            let column = scene.state.jacobian_column(at, &contact.p_WC);
             *tau = self.config.K_v * qd_des + push * contact.n_W.dot(&column);
         }
     }

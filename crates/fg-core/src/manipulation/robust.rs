@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::manipulation::lti::{StateSpace, StateSpaceSpec};
 use crate::signals::Reference;
 use crate::spatial::{integrate, pose_error};
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use serde::Deserialize;
 
 const FORMAT: &str = "fingergait-controller/1";
@@ -144,8 +144,8 @@ pub struct RobustController {
     K: Controller,
     config: RobustConfig,
     dt: f64,
-    /// Nominal weight of the object, N: what the linearisation compensates.
-    weight: f64,
+    /// Force that holds the object's nominal weight, N: what the linearisation compensates.
+    lift: Vector3<f64>,
     e: Vector6<f64>,
     u: Vector6<f64>,
     V_WD: Vector6<f64>,
@@ -154,15 +154,22 @@ pub struct RobustController {
 }
 
 impl RobustController {
-    /// `K` at the control period `dt`; `mass` is the object's nominal mass where it differs from the artefact's.
-    pub fn new(K: Controller, config: &RobustConfig, mass: Option<f64>, dt: f64) -> Result<Self, Error> {
+    /// `K` at the control period `dt` under the acceleration of gravity `g_W` in W, m/s^2; `mass` is the object's nominal mass
+    /// where it differs from the artefact's.
+    pub fn new(
+        K: Controller,
+        config: &RobustConfig,
+        mass: Option<f64>,
+        g_W: &Vector3<f64>,
+        dt: f64,
+    ) -> Result<Self, Error> {
         if (K.sample_time - dt).abs() > 1e-9 {
             let expected = format!("{dt} s, the control period (synthesise for this rate)");
             return Err(Error::artifact("sample_time", expected, K.sample_time));
         }
-        let weight = mass.unwrap_or(K.nominal.mass) * 9.81;
+        let lift = -g_W * mass.unwrap_or(K.nominal.mass);
         let zero = Vector6::zeros();
-        Ok(Self { K, config: config.clone(), dt, weight, e: zero, u: zero, V_WD: zero, filtered: None })
+        Ok(Self { K, config: config.clone(), dt, lift, e: zero, u: zero, V_WD: zero, filtered: None })
     }
 
     /// Returns to rest.
@@ -191,7 +198,9 @@ impl RobustController {
         self.e = pose_error(&X_WD, X_WO);
         self.u = self.K.output(&self.e);
         let mut F = self.u.component_mul(&self.beta());
-        F[2] += self.weight;
+        for (F, lift) in F.iter_mut().zip(&self.lift) {
+            *F += lift;
+        }
         F
     }
 
@@ -238,11 +247,13 @@ mod tests {
     #[test]
     fn wrench_holds_the_weight_and_pulls_towards_the_reference() {
         let K = Controller::from_json(&artefact(10.0)).unwrap();
-        let mut robust = RobustController::new(K, &RobustConfig::default(), None, 0.002).unwrap();
+        let g_W = Vector3::new(1.0, -2.0, -9.81);
+        let mut robust = RobustController::new(K, &RobustConfig::default(), None, &g_W, 0.002).unwrap();
         let X_WD = Isometry3::new([0.1, 0.0, 0.0].into(), [0.0, 0.0, 0.2].into());
         let reference = Reference { X_WD, V_WD: Vector6::zeros() };
         let F = robust.wrench(&reference, &Isometry3::identity());
-        let expected = Vector6::new(0.5 * 10.0 * 0.1, 0.0, 0.5 * 9.81, 0.0, 0.0, 0.3 * 10.0 * 0.2);
+        let expected =
+            Vector6::new(0.5 * (10.0 * 0.1 - 1.0), 0.5 * 2.0, 0.5 * 9.81, 0.0, 0.0, 0.3 * 10.0 * 0.2);
         assert!((F - expected).norm() < 1e-12);
     }
 

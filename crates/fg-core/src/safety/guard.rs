@@ -104,7 +104,7 @@ impl Guard {
             clock: Clock::new(config, dt),
             joints: JointGuard::new(hand, config, dt),
             touch: TouchGuard::new(hand.n_fingers(), config, contact_force, dt),
-            motors: MotorGuard::new(hand.n_fingers(), hand.n_joints(), config, dt),
+            motors: MotorGuard::new((0..hand.n_fingers()).map(|j| hand.joints(j)).collect(), config, dt),
             odometry: Odometry::new(hand, dt),
             pose: PoseGuard::new(config, dt),
             reference: ReferenceGuard::new(config, dt),
@@ -115,7 +115,7 @@ impl Guard {
             blind: false,
             squeeze: 0.0,
             damped: vec![false; hand.n_fingers()],
-            trusted: Measurement::zeros(hand.n_fingers(), hand.n_joints()),
+            trusted: Measurement::zeros(hand.n_fingers(), hand.n_q()),
             config: config.clone(),
             dt,
         }
@@ -184,9 +184,9 @@ impl Guard {
         self.motors.drives(j)
     }
 
-    /// The torque with which joint `at` is tested for power, N m.
-    pub fn motor_test(&self, at: usize) -> Option<f64> {
-        self.motors.test(at)
+    /// The torque with which joint `at` of finger `j` is tested for power, N m.
+    pub fn motor_test(&self, j: usize, at: usize) -> Option<f64> {
+        self.motors.test(j, at)
     }
 
     /// True where finger `j` is to be let go: its angles have failed, and it feels nothing.

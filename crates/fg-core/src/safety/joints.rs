@@ -5,7 +5,8 @@ use super::debounce::Debounce;
 use super::odometry::Odometry;
 use super::relearn::Refused;
 use super::{Fault, Faults};
-use crate::hand::{HandModel, HandState};
+use crate::hand::{Coordinate, HandModel, HandState};
+use std::ops::Range;
 
 /// Good samples before jumps are judged: the first one may be the bad one.
 const SETTLE: u32 = 10;
@@ -41,7 +42,7 @@ struct Joint {
 #[derive(Debug, Clone)]
 pub struct JointGuard {
     config: SafetyConfig,
-    n_joints: usize,
+    fingers: Vec<Range<usize>>,
     joints: Vec<Joint>,
     /// For each finger, whether its kinematics have failed for long enough.
     failed: Vec<Debounce>,
@@ -64,14 +65,12 @@ pub struct Use<'a> {
 impl JointGuard {
     /// A guard for `hand` at the control period `dt`.
     pub fn new(hand: &HandModel, config: &SafetyConfig, dt: f64) -> Self {
-        let n_joints = hand.n_joints();
-        let limits = (0..hand.n_fingers()).flat_map(|j| (0..n_joints).map(move |i| hand.limits(j, i)));
         let margin = config.joint_margin;
-        let joint = |(lower, upper): (f64, f64)| Joint::new(lower - margin, upper + margin);
+        let joint = |c: &Coordinate| Joint::new(c.lower - margin, c.upper + margin);
         Self {
             config: config.clone(),
-            n_joints,
-            joints: limits.map(joint).collect(),
+            fingers: (0..hand.n_fingers()).map(|j| hand.joints(j)).collect(),
+            joints: hand.coordinates().iter().map(joint).collect(),
             failed: vec![Debounce::default(); hand.n_fingers()],
             refused: vec![Refused::default(); hand.n_fingers()],
             samples: 0,
@@ -120,7 +119,7 @@ impl JointGuard {
         let settled = self.samples >= SETTLE;
         self.samples = self.samples.saturating_add(1);
         for j in 0..self.failed.len() {
-            let at = j * self.n_joints..(j + 1) * self.n_joints;
+            let at = self.fingers[j].clone();
             let using = using(j);
             let mut bad = false;
             for (i, joint) in self.joints[at.clone()].iter_mut().enumerate() {
@@ -130,7 +129,8 @@ impl JointGuard {
             }
             let held = using.holding && using.touching;
             if bad {
-                let turns = self.joints[at.clone()].iter().map(Joint::turn);
+                let joints = &self.joints[at.clone()];
+                let turns = |i: usize| joints[i].turn();
                 let refused = &mut self.refused[j];
                 if refused.explains(j, turns, held, elapsed, state, odometry) {
                     self.joints[at.clone()].iter_mut().for_each(Joint::believe);
@@ -161,12 +161,13 @@ impl JointGuard {
         let drift = odometry.drift(j);
         let length = drift.norm();
         let drifts = using.holding && length > c.stuck_distance && length > 3.0 * odometry.drift_of_others(j);
-        let joints = &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints];
+        let first = self.fingers[j].start;
+        let joints = &mut self.joints[self.fingers[j].clone()];
         let all = joints.iter().all(|joint| joint.still > c.stuck_time);
         let mut stuck = false;
         for (i, joint) in joints.iter_mut().enumerate() {
             if joint.still > c.stuck_time {
-                let column = || state.jacobian_column(j, i, odometry.contact(j));
+                let column = || state.jacobian_column(first + i, odometry.contact(j));
                 let own = || column().dot(&drift).abs() > ALONG * column().norm() * length;
                 joint.stuck |= (drifts && (all || own())) || joint.asked.abs() > c.stuck_angle;
             }

@@ -9,6 +9,7 @@
 
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
+use std::ops::Range;
 
 /// Time over which small torques are averaged, as a multiple of the time that large ones take to be judged ...
 const LONGER: f64 = 5.0;
@@ -39,8 +40,9 @@ struct Finger {
 pub struct MotorGuard {
     config: SafetyConfig,
     dt: f64,
-    n_joints: usize,
     fingers: Vec<Finger>,
+    /// Joints of each finger.
+    ranges: Vec<Range<usize>>,
     joints: Vec<Joint>,
 }
 
@@ -57,11 +59,11 @@ struct Joint {
 }
 
 impl MotorGuard {
-    /// A guard for `n_fingers` of `n_joints` each at the control period `dt`.
-    pub fn new(n_fingers: usize, n_joints: usize, config: &SafetyConfig, dt: f64) -> Self {
-        let fingers = vec![Finger::default(); n_fingers];
-        let joints = vec![Joint::default(); n_fingers * n_joints];
-        Self { config: config.clone(), dt, n_joints, fingers, joints }
+    /// A guard for fingers with these joints at the control period `dt`.
+    pub fn new(ranges: Vec<Range<usize>>, config: &SafetyConfig, dt: f64) -> Self {
+        let fingers = vec![Finger::default(); ranges.len()];
+        let joints = vec![Joint::default(); ranges.last().map_or(0, |range| range.end)];
+        Self { config: config.clone(), dt, fingers, ranges, joints }
     }
 
     /// Forgets the past.
@@ -80,9 +82,9 @@ impl MotorGuard {
         self.fingers.iter().any(|finger| finger.released || finger.silent.confirmed())
     }
 
-    /// The torque with which joint `at` of a released finger is tested, N m; none where it is not.
-    pub fn test(&self, at: usize) -> Option<f64> {
-        let finger = &self.fingers[at / self.n_joints];
+    /// The torque with which joint `at`, of the released finger `j`, is tested, N m; none where it is not.
+    pub fn test(&self, j: usize, at: usize) -> Option<f64> {
+        let finger = &self.fingers[j];
         let torque = TEST * self.config.motor_asked;
         (finger.released && self.joints[at].dead).then_some(if finger.back { -torque } else { torque })
     }
@@ -93,7 +95,7 @@ impl MotorGuard {
     /// letting go would not help: none of them is released.
     pub fn admit(&mut self, asked: &[f64], given: &[f64]) {
         for j in 0..self.fingers.len() {
-            let at = j * self.n_joints..(j + 1) * self.n_joints;
+            let at = self.ranges[j].clone();
             self.listen(j, &asked[at.clone()], &given[at]);
         }
         let silent =
@@ -107,7 +109,7 @@ impl MotorGuard {
     fn listen(&mut self, j: usize, asked: &[f64], given: &[f64]) {
         let (c, dt) = (&self.config, self.dt);
         let finger = &mut self.fingers[j];
-        let joints = &mut self.joints[j * self.n_joints..(j + 1) * self.n_joints];
+        let joints = &mut self.joints[self.ranges[j].clone()];
         let pairs = asked.iter().copied().zip(given.iter().copied());
         if finger.released {
             // NaN follows nothing, and what was not asked for the test proves nothing.
@@ -167,6 +169,11 @@ mod tests {
 
     const DT: f64 = 0.002;
 
+    /// Four fingers with three joints each.
+    fn fingers() -> Vec<Range<usize>> {
+        (0..4).map(|j| 3 * j..3 * j + 3).collect()
+    }
+
     /// Motors that follow at once, but for those of `dead`; gives what was asked for last.
     fn drive(guard: &mut MotorGuard, steps: usize, hold: f64, dead: &[usize]) -> Vec<f64> {
         let mut asked = vec![hold; 12];
@@ -175,7 +182,7 @@ mod tests {
                 (0..12).map(|at| if dead.contains(&at) { 0.0 } else { asked[at] }).collect();
             guard.admit(&asked, &given);
             asked = (0..12)
-                .map(|at| guard.test(at).unwrap_or(if guard.drives(at / 3) { hold } else { 0.02 }))
+                .map(|at| guard.test(at / 3, at).unwrap_or(if guard.drives(at / 3) { hold } else { 0.02 }))
                 .collect();
         }
         asked
@@ -183,7 +190,7 @@ mod tests {
 
     #[test]
     fn a_finger_without_power_is_released_and_comes_back() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         drive(&mut guard, 100, 0.2, &[]);
         assert!(!guard.failed());
         drive(&mut guard, 5, 0.2, &[3, 4, 5]);
@@ -199,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_torque_that_was_not_asked_for_proves_nothing() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         drive(&mut guard, 20, 0.2, &[3, 4, 5]);
         for _ in 0..200 {
             guard.admit(&[0.01; 12], &[0.0; 12]);
@@ -209,7 +216,7 @@ mod tests {
 
     #[test]
     fn a_finger_that_slides_is_asked_for_little_and_judged_on_average() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         drive(&mut guard, 1000, 0.06, &[]);
         drive(&mut guard, 25, 0.06, &[0, 1, 2]);
         assert!(guard.drives(0));
@@ -219,12 +226,12 @@ mod tests {
 
     #[test]
     fn only_the_dead_joint_is_tested_and_to_and_fro() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         drive(&mut guard, 20, 0.2, &[7]);
         let (mut least, mut most) = (0.0_f64, 0.0_f64);
         for _ in 0..100 {
             let asked = drive(&mut guard, 1, 0.2, &[7]);
-            assert!(guard.test(6).is_none() && guard.test(8).is_none());
+            assert!(guard.test(2, 6).is_none() && guard.test(2, 8).is_none());
             least = least.min(asked[7]);
             most = most.max(asked[7]);
         }
@@ -233,7 +240,7 @@ mod tests {
 
     #[test]
     fn weak_motors_unknown_torques_and_idle_joints_are_no_fault() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         for _ in 0..1000 {
             guard.admit(&[0.3; 12], &[0.05; 12]);
             guard.admit(&[-0.3; 12], &[f64::NAN; 12]);
@@ -247,7 +254,7 @@ mod tests {
 
     #[test]
     fn where_most_fingers_give_nothing_none_is_released() {
-        let mut guard = MotorGuard::new(4, 3, &SafetyConfig::default(), DT);
+        let mut guard = MotorGuard::new(fingers(), &SafetyConfig::default(), DT);
         for _ in 0..100 {
             guard.admit(&[0.2; 12], &[0.0; 12]);
             assert!((0..4).all(|j| guard.drives(j)));

@@ -8,7 +8,7 @@
 
 use super::odometry::Odometry;
 use crate::hand::HandState;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 /// The angles must explain the contact for this long, s ...
 const TIME: f64 = 0.3;
@@ -64,12 +64,12 @@ impl Refused {
 
     /// Takes a step of `elapsed` seconds in which angles of finger `j` are refused; true where they are right after all.
     ///
-    /// `turns` are what the sample has over the last good angle, joint by joint, rad; None where a joint has no angle.
+    /// `turns(i)` is what the sample has over the last good angle of the finger's joint `i`, rad; None where it has no angle.
     /// `state` and `odometry` are those of the last step, on the last good angles.
     pub fn explains(
         &mut self,
         j: usize,
-        turns: impl DoubleEndedIterator<Item = Option<f64>> + ExactSizeIterator,
+        turns: impl Fn(usize) -> Option<f64>,
         holding: bool,
         elapsed: f64,
         state: &HandState,
@@ -82,9 +82,7 @@ impl Refused {
         let Some((p_F, p_O)) = self.mark else { return false };
         let expected = (X_WO * p_O).coords;
         let good = (state.tip(j) * p_F).coords;
-        // From the tip inwards: the joints further in are still where the state has them.
-        let turn = |p: Vector3<f64>, (i, by): (usize, Option<f64>)| by.map(|by| state.turned(j, i, by, &p));
-        let Some(found) = turns.enumerate().rev().try_fold(good, turn) else {
+        let Some(found) = state.turned(j, turns, &good) else {
             self.agrees = 0.0;
             return false;
         };

@@ -16,9 +16,9 @@
 use crate::friction::FrictionPyramid;
 
 /// Largest number of contacts.
-pub const MAX_CONTACTS: usize = 5;
-/// Force components kept per vector: 3 for each contact, and one that is always zero, so that loops are of fixed length.
-pub const WIDTH: usize = 16;
+pub const MAX_CONTACTS: usize = 6;
+/// Force components kept per vector: 3 for each contact, whether there is one or not, so that loops are of fixed length.
+pub const WIDTH: usize = 3 * MAX_CONTACTS;
 /// Largest number of rows that can be active and independent at once.
 pub const MAX_ACTIVE: usize = 3 * MAX_CONTACTS;
 
@@ -257,7 +257,7 @@ impl ForceQp {
 #[inline]
 pub fn dot(x: &Forces, y: &Forces) -> f64 {
     let mut sum = [0.0; 4];
-    for (x, y) in x.chunks_exact(4).zip(y.chunks_exact(4)) {
+    for (x, y) in x.chunks(4).zip(y.chunks(4)) {
         for ((s, x), y) in sum.iter_mut().zip(x).zip(y) {
             *s += x * y;
         }

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each user needs its own part")]
 
 use fg_core::dual_stage::DualStagePlanner;
+use fg_core::hand::TorqueLimits;
 use fg_core::signals::{Measurement, Reference};
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 
@@ -95,7 +96,7 @@ pub fn spoil(bytes: &mut Bytes<'_>, m: &mut Measurement, r: &mut Reference) {
         }
         12 => m.tactile.iter_mut().for_each(|tactile| tactile.f_n = 0.0),
         _ => {
-            *m = Measurement::zeros(n, n_q / n);
+            *m = Measurement::zeros(n, n_q);
             r.V_WD = Vector6::repeat(bytes.number(0.0));
         }
     }
@@ -104,9 +105,11 @@ pub fn spoil(bytes: &mut Bytes<'_>, m: &mut Measurement, r: &mut Reference) {
 /// What must hold of every command, whatever came in.
 pub fn check(planner: &DualStagePlanner, tau: &DVector<f64>, before: &DVector<f64>) {
     let config = planner.config();
+    let limits = TorqueLimits::of(planner.hand(), config.force.tau_max).expect("limits");
+    let limits = limits.min().iter().zip(limits.max());
     let change = config.force.tau_rate_max / config.rate_hz * (1.0 + 1e-12);
-    for (tau, before) in tau.iter().zip(before.iter()) {
-        assert!(tau.is_finite() && tau.abs() <= config.force.tau_max, "{tau}");
+    for ((tau, before), (min, max)) in tau.iter().zip(before.iter()).zip(limits) {
+        assert!(tau.is_finite() && min <= tau && tau <= max, "{tau}");
         assert!((tau - before).abs() <= change, "{tau} after {before}");
     }
     let mut row = Vec::new();

@@ -24,6 +24,7 @@ fn joint(name: &str, position: [f64; 3], quaternion: [f64; 4], axis: [f64; 3], l
         damping: 0.05,
         mass: LINK_MASS,
         com: LINK_COM,
+        ..Joint::default()
     }
 }
 
@@ -80,7 +81,7 @@ pub fn com_heights(n: usize, j: usize, q: &[f64]) -> [f64; 3] {
 /// A measurement of the fingers at `q` that touch, with `f_n` newtons, an upright object at the middle.
 pub fn measurement(hand: &HandModel, q: &[f64], f_n: f64) -> Measurement {
     let n = hand.n_fingers();
-    let mut measurement = Measurement::zeros(n, hand.n_joints());
+    let mut measurement = Measurement::zeros(n, hand.n_q());
     measurement.q.copy_from_slice(q);
     measurement.X_WO = Isometry3::translation(0.0, 0.0, 0.06);
     for j in 0..n {

@@ -76,9 +76,9 @@ impl Instance {
 /// A problem with nothing of a hand about it but the sizes of its numbers: loose, tight, empty and coupled torque bounds,
 /// caps, pinned contacts, flat grasp maps. Returns the pyramids with it.
 pub fn arbitrary(random: &mut Random) -> (Vec<FrictionPyramid>, Instance) {
-    let n = 2 + random.below(4);
+    let n = 2 + random.below(5);
     let m = 3 + random.below(10);
-    let n_q = [3 * n, 4 * n, 2 * n][random.below(3)];
+    let n_q = [3 * n, 4 * n, 2 * n, 7 * n][random.below(4)];
     let kind = random.below(6);
     let coupled = random.below(4) == 0;
     let pyramids = (0..n).map(|_| FrictionPyramid::inscribed(random.uniform(0.1, 1.5), m).unwrap()).collect();

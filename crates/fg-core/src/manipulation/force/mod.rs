@@ -76,7 +76,7 @@ pub struct ForceOptimizer {
 }
 
 impl ForceOptimizer {
-    /// An optimiser for one contact per pyramid (1 to 5) and `n_q` joints.
+    /// An optimiser for one contact per pyramid (1 to 6) and `n_q` joints.
     pub fn new(pyramids: &[FrictionPyramid], n_q: usize, settings: ForceSettings) -> Result<Self, Error> {
         if !(1..=MAX_CONTACTS).contains(&pyramids.len()) {
             return Err(Error::config("pyramids", format!("1 to {MAX_CONTACTS} contacts"), pyramids.len()));
