@@ -37,7 +37,6 @@ pub mod gait;
 pub mod grasp;
 pub mod hand;
 pub mod manipulation;
-pub mod rules;
 pub mod safety;
 pub mod signals;
 pub mod solver;
