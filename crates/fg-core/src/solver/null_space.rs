@@ -192,6 +192,11 @@ impl Equalities for NullSpaceFactors {
         self.f
     }
 
+    /// None to speak of: the forces come from no multipliers.
+    fn rounding(&self) -> f64 {
+        0.0
+    }
+
     /// Nothing: the forces come from no multipliers.
     fn refine(&mut self, _qp: &ForceQp, _f: &mut Forces) {}
 }

@@ -39,9 +39,10 @@ pub struct ForceSettings {
     pub alpha: [f64; 3],
     /// Solver asked first.
     pub solver: SolverChoice,
-    /// N: an answer with a KKT residual up to this is certified. See [`kkt::Residual::certifies`].
+    /// An answer whose KKT residual is at most this, relative to its largest force ([`ForceQp::size`]), is certified. See
+    /// [`kkt::Residual`].
     pub tolerance: f64,
-    /// N: where rounding or an interior point allow no better, an answer is still taken up to this KKT residual.
+    /// Where rounding or an interior point allow no better, an answer is still taken up to this relative KKT residual.
     pub raw_tolerance: f64,
     /// Bound on the active set's changes.
     pub max_changes: usize,
@@ -163,8 +164,9 @@ impl ForceOptimizer {
         );
         self.qp.set_torques(problem.J.as_slice(), problem.tau_min.as_slice(), problem.tau_max.as_slice());
         if !self.certified() {
-            let (f, violation) = hold(&self.qp, &self.last);
-            self.take(&f, SolverUsed::Held, violation, 0);
+            let (f, _) = hold(&self.qp, &self.last);
+            let kkt = kkt::without_multipliers(&self.qp, &f, self.settings.tolerance);
+            self.take(&f, SolverUsed::Held, kkt, 0);
         }
         problem.J.tr_mul_to(&self.solution.f, &mut self.solution.tau);
         Ok(&self.solution)
@@ -240,8 +242,9 @@ impl ForceOptimizer {
         }
         let f = *self.interior_point.forces();
         let multipliers = self.interior_point.multipliers().iter().map(|(row, mu, _)| (*row, *mu));
-        let kkt = kkt::residual(&self.qp, &f, multipliers).worst();
-        if kkt <= self.settings.raw_tolerance {
+        let enough = self.settings.raw_tolerance * self.qp.size(&f);
+        let kkt = kkt::residual(&self.qp, &f, multipliers, enough).worst();
+        if kkt <= enough {
             self.take(&f, SolverUsed::Clarabel, kkt, iterations);
             return true;
         }
@@ -291,9 +294,11 @@ fn run<E: Equalities>(active_set: &mut ActiveSet<E>, qp: &ForceQp, settings: &Fo
             active_set.refine(qp);
         }
         let f = active_set.forces();
-        let residual = kkt::residual(qp, f, active_set.multipliers());
+        let size = qp.size(f);
+        let (tolerance, loose) = (settings.tolerance * size, settings.raw_tolerance * size);
+        let residual = kkt::residual(qp, f, active_set.multipliers(), tolerance);
         let rounding = || kkt::rounding(qp, f, active_set.multipliers());
-        if residual.certifies(settings.tolerance, settings.raw_tolerance, rounding) {
+        if residual.certifies(tolerance, loose, rounding) {
             return Verdict::Certified(residual.worst());
         }
     }
