@@ -12,7 +12,7 @@ from fingergait.campaign.distributions import Distribution
 from fingergait.paths import find
 from fingergait.scenario import Scenario
 from fingergait.scenario.faults import KINDS
-from fingergait.scenario.fields import Index, NonNegative, Table
+from fingergait.fields import Index, NonNegative, Table
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -15,7 +15,7 @@ from fingergait._core import ConfigError
 from fingergait.object.shapes import SIZES, Shape
 from fingergait.paths import find
 from fingergait.scenario.faults import KINDS, Fault
-from fingergait.scenario.fields import NonNegative, Positive, Table, Twist, Vector
+from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 
 if sys.version_info >= (3, 11):
     import tomllib
