@@ -9,6 +9,10 @@ from fingergait.hand.facts import Facts
 from fingergait.hand.obstacle import Notes
 
 
+NAMELESS = "fingergait_nameless_"
+"""What the names begin with that the importer gives to what has none."""
+
+
 @dataclass
 class Chain:
     """One finger by names in the model: its tip's geom and the joints from the base on; `name` is the finger's."""
@@ -120,7 +124,9 @@ def _last_bodies(model: mujoco.MjModel) -> list[int]:
     last: dict[int, list[int]] = {}
     for end in ends:
         last.setdefault(_joints_of(model, end)[-1], []).append(end)
-    for bodies in last.values():
+    # A part that hangs on a finger's inner link ends a chain too, and is no finger.
+    inner = {joint for end in ends for joint in _joints_of(model, end)[:-1]}
+    for bodies in (bodies for joint, bodies in last.items() if joint not in inner):
         geoms: list[int] = []
         for body in bodies:
             while body and not _touching_parts(model, body):
@@ -179,7 +185,8 @@ def _body(model: mujoco.MjModel, geom: int) -> str:
 
 def geom_name(model: mujoco.MjModel, geom: int) -> str:
     """Name of a geom, or of what it is part of."""
-    return str(model.geom(geom).name) or f"a {_kind(model, geom)} of {_body(model, geom) or 'the world'}"
+    name = str(model.geom(geom).name)
+    return f"a {_kind(model, geom)} of {_body(model, geom)}" if name.startswith(NAMELESS) else name
 
 
 def _kind(model: mujoco.MjModel, geom: int) -> str:
@@ -187,7 +194,9 @@ def _kind(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _label(model: mujoco.MjModel, geom: int) -> str:
-    name = model.geom(geom).name or _body(model, geom) or f"finger {geom}"
+    name = model.geom(geom).name
+    if name.startswith(NAMELESS):
+        name = _body(model, geom)
     return str(name.removesuffix("tip").rstrip("_-. ") or name)
 
 

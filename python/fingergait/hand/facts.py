@@ -1,18 +1,18 @@
 """What a model's file doesn't say about a hand: a small TOML file beside it.
 
-    torque = 0.5                      # N m, every motor; or [lower, upper]
-    lag = 0.005                       # s, every motor's time constant
-    tips = ["ff_tip", "th_tip"]       # geoms, bodies or sites; one a finger
-    leave_out = ["little"]            # fingers by name, or tips: held where they are
-    pose = [0, 0, 0.1, 0, 0, 0]       # of the model in the world: m and rotation vector
+torque = 0.5                      # N m, every motor; or [lower, upper]
+lag = 0.005                       # s, every motor's time constant
+tips = ["ff_tip", "th_tip"]       # geoms, bodies or sites; one a finger
+leave_out = ["little"]            # fingers by name, or tips: held where they are
+pose = [0, 0, 0.1, 0, 0, 0]       # of the model in the world: m and rotation vector
 
-    [joints.ffj0]
-    torque = [-0.3, 0.5]              # lag, damping, reference, range likewise
-    held = 0.2                        # rad: fixed there, no joint of a finger
+[joints.ffj0]
+torque = [-0.3, 0.5]              # lag, damping, reference, range likewise
+held = 0.2                        # rad: fixed there, no joint of a finger
 
-    [tip.ff_tip]
-    centre = [0, 0, 0.029]            # m, in the frame of the tip's body
-    radius = 0.012                    # m
+[tip.ff_tip]
+centre = [0, 0, 0.029]            # m, in the frame of the tip's body
+radius = 0.012                    # m
 """
 
 import sys

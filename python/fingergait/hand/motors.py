@@ -66,7 +66,7 @@ def motor_of(model: mujoco.MjModel, joint: int, ratio: float, facts: Facts, note
 def gear_at(model: mujoco.MjModel, actuator: int, joint: int) -> float:
     """Torque at `joint` for one unit of the actuator's force; zero where it doesn't drive the joint."""
     kind, gear = int(model.actuator_trntype[actuator]), float(model.actuator_gear[actuator, 0])
-    if kind in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
+    if kind in (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)):
         return gear if int(model.actuator_trnid[actuator, 0]) == joint else 0.0
     if kind == mujoco.mjtTrn.mjTRN_TENDON:
         return gear * tendon_share(model, int(model.actuator_trnid[actuator, 0]), joint)
@@ -118,8 +118,8 @@ def _kind(model: mujoco.MjModel, actuator: int) -> str:
 
 
 def _lag(model: mujoco.MjModel, actuator: int) -> float:
-    kind = model.actuator_dyntype[actuator]
-    if kind in (mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT):
+    kind = int(model.actuator_dyntype[actuator])
+    if kind in (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)):
         return float(model.actuator_dynprm[actuator, 0])
     return 0.0
 

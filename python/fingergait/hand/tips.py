@@ -49,7 +49,9 @@ def _fit_cap(points: Array, outward: Array) -> TipSphere:
         cap = points[heights > top - _CAP * radius]
         if len(cap) < 8:
             cap = points[np.argsort(heights)[-8:]]
-        solution, *_ = np.linalg.lstsq(np.hstack([2.0 * cap, np.ones((len(cap), 1))]), (cap * cap).sum(axis=1), rcond=None)
+        solution, *_ = np.linalg.lstsq(
+            np.hstack([2.0 * cap, np.ones((len(cap), 1))]), (cap * cap).sum(axis=1), rcond=None
+        )
         found = solution[:3]
         square = float(solution[3] + found @ found)
         # A flat end fits a sphere of any size: none larger than the part itself.

@@ -52,11 +52,13 @@ class MujocoPlant:
         self.start = nominal_start(self.scene, scenario)
         self.injection = Injection(self.scene, scenario.fault)
         self.data = mujoco.MjData(self.scene.model)
-        n, m = len(self.scene.fingers), self.scene.n_joints
-        self.config = core_config(scenario, float(torque_limits(self.scene).min()))
-        self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), self.config)
-        self._tau = np.zeros((n, m))
-        self._tau_row = self._tau.reshape(-1)
+        self.config = core_config(scenario)
+        low, high = torque_limits(self.scene)
+        self._pid = TorquePid(len(self.scene.q), float(self.scene.model.opt.timestep), self.config, low, high)
+        self._tau = np.zeros(len(self.scene.q))
+        # A motor without lag gives what it is told: a loop around it would only answer its own last step.
+        lags = [motor.lag for finger in self.scene.fingers for motor in finger.motors]
+        self._ideal = np.array(lags) < self.scene.model.opt.timestep
         self.t = 0.0
         self.reset()
 
@@ -66,10 +68,11 @@ class MujocoPlant:
         mujoco.mj_resetData(scene.model, data)
         data.qpos[:] = self.start.qpos
         data.ctrl[scene.act] = self.start.torque
-        data.act[scene.model.actuator_actadr[scene.act]] = self.start.torque
+        lagging = scene.model.actuator_actadr[scene.act] >= 0
+        data.act[scene.model.actuator_actadr[scene.act[lagging]]] = self.start.torque[lagging]
         for _ in range(round(_CLOSING_S / scene.model.opt.timestep)):
             mujoco.mj_step(scene.model, data)
-        self._tau_row[:] = data.actuator_force[scene.act]
+        self._tau[:] = data.actuator_force[scene.act]
         self._pid.reset()
         self.injection.reset()
         self._steps = 0
@@ -81,7 +84,7 @@ class MujocoPlant:
     def step(self, command: Command) -> Measurement:
         """Drives the motors with `command` for one control period, or for more where a fault makes ticks drop."""
         for _ in range(self.injection.periods(self.t)):
-            self._drive(command.tau)
+            self._drive(command.tau.ravel())
             self._steps += 1
             self.t = (self._steps - self._lead) * self.scenario.period
         return self.sensors.read(self.t)
@@ -99,10 +102,11 @@ class MujocoPlant:
             data.xfrc_applied[self.scene.object_body, :3] += pull
         desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
-            motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()
+            reading = faults.torque_reading(self.t, self._tau)
+            motors = self._pid.step(desired, np.where(self._ideal, desired, reading)).ravel()
             data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
-            self._tau_row[:] = data.actuator_force[act]
+            self._tau[:] = data.actuator_force[act]
 
     def close(self) -> None:
         """Switches the motors off."""
@@ -117,7 +121,7 @@ class MujocoPlant:
 
     @property
     def joint_angles(self) -> Array:
-        """True joint angles (n_fingers * n_joints,), rad; for the log only."""
+        """True joint angles (n_q,), rad; for the log only."""
         angles: Array = self.data.qpos[self.scene.q]
         return angles
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
 from fingergait.scenario import Scenario
-from fingergait.sim.scene import OBJECT, SceneModel
+from fingergait.sim.scene import OBJECT, SceneModel, torque_limits
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ _TOLERANCE = 1e-6  # m: of the inverse kinematics
 
 @dataclass(frozen=True)
 class Start:
-    """`qpos` of the whole scene; torques (n_fingers * n_joints,), N m, that hold the fingers and press lightly."""
+    """`qpos` of the whole scene; torques (n_q,), N m, that hold the fingers and press lightly."""
 
     qpos: Array
     torque: Array
@@ -31,9 +31,10 @@ class Start:
 def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     """Object pose, joint angles and motor torques that a run of this scenario starts from.
 
-    The object stands upright on the palm at the hand's axis, off by `truth.first_grasp`. Each tip touches its side at
-    the azimuth of the finger's base, off by `truth.finger_offset_deg`, and at the height `grasp.height` above O, off by
-    `truth.finger_height_offset`, all about the object where it really stands.
+    With `object.pose` and `grasp.joints` these are the start, the object off by `truth.first_grasp`. Otherwise the object
+    stands upright amid the fingers' bases, on the palm, and each tip touches its side at the azimuth of the finger's base,
+    off by `truth.finger_offset_deg`, and at the height `grasp.height` above O, off by `truth.finger_height_offset`, all
+    about the object where it really stands.
 
     Raises
     ------
@@ -45,14 +46,24 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     n = len(scene.fingers)
     turns = np.deg2rad(_per_finger(scenario.truth.finger_offset_deg, n, "truth.finger_offset_deg"))
     heights = _per_finger(scenario.truth.finger_height_offset, n, "truth.finger_height_offset")
-    data.qpos[scene.q] = model.jnt_range[_joints(scene)].mean(axis=1)
-    data.qpos[scene.object_q : scene.object_q + 7] = _object_pose(scenario)
+    _set_joints(scene, data, model.jnt_range[_joints(scene)].mean(axis=1))
+    mujoco.mj_kinematics(model, data)
+    data.qpos[scene.object_q : scene.object_q + 7] = _object_pose(scene, data, scenario)
     mujoco.mj_kinematics(model, data)
     _raise_onto_palm(scene, data)
     middle = data.xpos[scene.object_body].copy()
+    if scenario.grasp.joints is not None:
+        if len(scenario.grasp.joints) != len(scene.q):
+            found = len(scenario.grasp.joints)
+            raise ConfigError(f"grasp.joints: expected {len(scene.q)} angles, one for each joint, found {found}")
+        _set_joints(scene, data, np.array(scenario.grasp.joints))
+        mujoco.mj_kinematics(model, data)
+        _check_clear(scene, data)
+        return Start(data.qpos.copy(), _hold(scene, data, middle, scenario.grasp.press))
+    hub = data.xanchor[[finger.joints[0] for finger in scene.fingers]].mean(axis=0)
     for index, finger in enumerate(scene.fingers):
         base = data.xanchor[finger.joints[0]]
-        azimuth = np.arctan2(base[1], base[0]) + turns[index]
+        azimuth = np.arctan2(base[1] - hub[1], base[0] - hub[0]) + turns[index]
         outward = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         origin = middle + np.array([0.0, 0.0, scenario.grasp.height + heights[index]])
         target = _touching(scene, data, index, origin, outward)
@@ -72,14 +83,41 @@ def _joints(scene: SceneModel) -> list[int]:
     return [joint for finger in scene.fingers for joint in finger.joints]
 
 
-def _object_pose(scenario: Scenario) -> Array:
-    offset = np.array(scenario.truth.first_grasp)
-    pose = np.array([0.0, 0.0, scenario.object.geometry.bottom, 1.0, 0.0, 0.0, 0.0])
+def _set_joints(scene: SceneModel, data: mujoco.MjData, q: Array) -> None:
+    """Moves the independent joints to `q`, rad, and those that follow them along."""
+    data.qpos[scene.q] = q
+    address = scene.model.jnt_qposadr
+    for coupling in scene.hand.couplings.values():
+        data.qpos[address[coupling.follower]] = coupling.ratio * data.qpos[address[coupling.leader]] + coupling.offset
+
+
+def _object_pose(scene: SceneModel, data: mujoco.MjData, scenario: Scenario) -> Array:
+    """The object's true pose (7,) in W at the start, before it is raised."""
+    offset, nominal = np.array(scenario.truth.first_grasp), scenario.object.pose
+    pose, turn = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.empty(4)
+    if nominal is not None:
+        pose[:3] = nominal[:3]
+        pose[3:] = _quaternion(np.array(nominal[3:]))
+    else:
+        bases = data.xanchor[[finger.joints[0] for finger in scene.fingers]]
+        pose[:2] = bases[:, :2].mean(axis=0)
+        pose[2] = scenario.object.geometry.bottom + min(float(bases[:, 2].mean()), _floor(scenario))
     pose[:3] += offset[:3]
-    angle = float(np.linalg.norm(offset[3:]))
-    if angle > 0.0:
-        mujoco.mju_axisAngle2Quat(pose[3:], offset[3:] / angle, angle)
+    mujoco.mju_mulQuat(turn, _quaternion(offset[3:]), pose[3:])
+    pose[3:] = turn
     return pose
+
+
+def _floor(scenario: Scenario) -> float:
+    return np.inf if scenario.support.height is None else scenario.support.height
+
+
+def _quaternion(vector: Array) -> Array:
+    """Quaternion wxyz of the rotation vector (3,)."""
+    out, angle = np.array([1.0, 0.0, 0.0, 0.0]), float(np.linalg.norm(vector))
+    if angle > 0.0:
+        mujoco.mju_axisAngle2Quat(out, vector / angle, angle)
+    return out
 
 
 def _raise_onto_palm(scene: SceneModel, data: mujoco.MjData) -> None:
@@ -117,23 +155,36 @@ def _reach(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) ->
     """Moves finger `index` in `data` so that its tip's centre is at `target`: damped least squares from mid-range."""
     model, finger = scene.model, scene.fingers[index]
     joints = list(finger.joints)
-    q, v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    q = model.jnt_qposadr[joints]
     lower, upper = model.jnt_range[joints].T
     jacobian = np.zeros((3, model.nv))
-    body = int(model.geom_bodyid[finger.tip])
+    tip = finger.probe
+    body = int(model.geom_bodyid[tip])
     for _ in range(200):
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        error = target - data.geom_xpos[finger.tip]
+        error = target - data.geom_xpos[tip]
         if np.linalg.norm(error) < _TOLERANCE:
             return
-        mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[finger.tip], body)
-        J = jacobian[:, v]  # (3, n_joints)
+        mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[tip], body)
+        J = _independent(scene, jacobian)[:, scene.joints[index]]  # (3, n_joints)
         step = J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(3), error)
-        data.qpos[q] = np.clip(data.qpos[q] + np.clip(step, -0.3, 0.3), lower, upper)
+        moved = data.qpos[scene.q].copy()
+        moved[scene.joints[index]] = np.clip(data.qpos[q] + np.clip(step, -0.3, 0.3), lower, upper)
+        _set_joints(scene, data, moved)
     place = ", ".join(f"{1e3 * x:.1f}" for x in target)
     found = f"one at ({place}) mm, {1e3 * np.linalg.norm(error):.1f} mm out of reach"
     raise ConfigError(f"object.size: expected an object whose side finger {finger.name} can touch, found {found}")
+
+
+def _independent(scene: SceneModel, columns: Array) -> Array:
+    """Columns (..., nv) of all joints as those (..., n_q) of the independent ones: followers move with their leaders."""
+    dofs = scene.model.jnt_dofadr
+    out: Array = columns[..., scene.v].copy()
+    place = {int(dof): k for k, dof in enumerate(scene.v)}
+    for coupling in scene.hand.couplings.values():
+        out[..., place[int(dofs[coupling.leader])]] += coupling.ratio * columns[..., dofs[coupling.follower]]
+    return out
 
 
 def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
@@ -141,9 +192,9 @@ def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
     model = scene.model
     geom = model.geom(OBJECT).id
     for finger in scene.fingers:
-        links = {int(model.jnt_bodyid[joint]) for joint in finger.joints}
+        links = {int(model.jnt_bodyid[joint]) for joint in finger.links}
         for other in range(model.ngeom):
-            if other in scene.tips or int(model.body_weldid[model.geom_bodyid[other]]) not in links:
+            if other == finger.tip or int(model.body_weldid[model.geom_bodyid[other]]) not in links:
                 continue
             depth = -_distance(model, data, geom, other)
             if model.geom_contype[other] and depth > 1e-4:
@@ -155,12 +206,17 @@ def _hold(scene: SceneModel, data: mujoco.MjData, middle: Array, press: float) -
     """Torques that hold the fingers' weight and press each tip towards the object's axis with the force `press`, N."""
     model = scene.model
     mujoco.mj_forward(model, data)
-    torque = np.asarray(data.qfrc_bias[scene.v])  # at rest: gravity alone
+    # At rest: gravity, and the springs of the joints.
+    torque = _independent(scene, data.qfrc_bias - data.qfrc_spring)
     jacobian = np.zeros((3, model.nv))
     for index, finger in enumerate(scene.fingers):
-        centre = data.geom_xpos[finger.tip]
-        inward = np.array([middle[0] - centre[0], middle[1] - centre[1], 0.0])
-        mujoco.mj_jac(model, data, jacobian, None, centre, int(model.geom_bodyid[finger.tip]))
-        own = slice(index * scene.n_joints, (index + 1) * scene.n_joints)
-        torque[own] += jacobian[:, scene.v[own]].T @ (press * inward / np.linalg.norm(inward))
-    return torque
+        centre = data.geom_xpos[finger.probe]
+        inward = middle - centre
+        # Along the horizontal, so that the fingers together neither lift nor push down.
+        inward[2] = 0.0
+        mujoco.mj_jac(model, data, jacobian, None, centre, int(model.geom_bodyid[finger.probe]))
+        own = scene.joints[index]
+        norm = max(float(np.linalg.norm(inward)), 1e-9)
+        torque[own] += _independent(scene, jacobian)[:, own].T @ (press * inward / norm)
+    low, high = torque_limits(scene)
+    return np.clip(torque, low, high)
