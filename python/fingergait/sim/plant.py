@@ -55,6 +55,9 @@ class MujocoPlant:
         self.config = core_config(scenario)
         low, high = torque_limits(self.scene)
         self._pid = TorquePid(len(self.scene.q), float(self.scene.model.opt.timestep), self.config, low, high)
+        # A motor that answers within two physics steps gives what it is told: feedback would only make it ring.
+        self._open = _lags(self.scene) < 2.0 * self.scene.model.opt.timestep
+        self._low, self._high = low, high
         self._tau = np.zeros(len(self.scene.q))
         # A motor without lag gives what it is told: a loop around it would only answer its own last step.
         lags = [motor.lag for finger in self.scene.fingers for motor in finger.motors]
@@ -102,8 +105,13 @@ class MujocoPlant:
             data.xfrc_applied[self.scene.object_body, :3] += pull
         desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
+<<<<<<< HEAD
             reading = faults.torque_reading(self.t, self._tau)
             motors = self._pid.step(desired, np.where(self._ideal, desired, reading)).ravel()
+=======
+            motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()
+            motors = np.where(self._open, np.clip(desired, self._low, self._high), motors)
+>>>>>>> 8da23f6 (Read the motors' lag, and leave motors without one alone)
             data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
             self._tau[:] = data.actuator_force[act]
@@ -135,3 +143,9 @@ class MujocoPlant:
         arm = self.data.xpos[body] - self.data.xipos[body]
         wrench[3:] += np.cross(arm, wrench[:3])
         self.data.xfrc_applied[body] = wrench
+
+
+def _lags(scene: SceneModel) -> Array:
+    """Time constant of each motor, (n_q,), s; zero where it has none."""
+    lagging = scene.model.actuator_dyntype[scene.act] != mujoco.mjtDyn.mjDYN_NONE
+    return np.where(lagging, scene.model.actuator_dynprm[scene.act, 0], 0.0)
