@@ -42,8 +42,8 @@ class HandModel:
         """Lower and upper limits, rad, narrowed so that joints that follow stay in theirs; shapes as of `tau_min`."""
     @property
     def tau_min(self) -> Array:
-        """Least torques that the model states, N m, NaN where it states none: (n_fingers, n_joints) where all fingers have
-        as many joints, else (n_q,). So are all arrays over the joints; (n_q,) is always taken."""
+        """Least torques that the model states, N m, NaN where it states none: (n_fingers, n_joints) where all fingers
+        have as many joints, else (n_q,). So are all arrays over the joints; (n_q,) is always taken."""
     @property
     def tau_max(self) -> Array:
         """Largest torques that the model states, N m, NaN where it states none."""
@@ -93,8 +93,8 @@ class Measurement:
         contact_place: ArrayLike,
         contact_force: ArrayLike,
     ) -> Measurement:
-        """t in s; q, tau (n_fingers, n_joints) or (n_q,); pose (7,): position and wxyz quaternion of O in W; contact_place
-        (n_fingers, 3): tactile contact in the fingertip frame F, m; contact_force (n_fingers,): normal force, N, zero
+        """t in s; q, tau (n_fingers, n_joints) or (n_q,); pose (7,): position and wxyz quaternion of O in W;
+        contact_place (n_fingers, 3): tactile contact in the fingertip frame F, m; contact_force (n_fingers,): normal force, N, zero
         where there is no contact."""
 
 @final

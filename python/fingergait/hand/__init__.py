@@ -1,8 +1,9 @@
 """What a hand is: from a model's file to the model that the compiled core reads."""
 
-from fingergait.hand.importer import OURS, Finger, Hand, compile_spec, import_hand, load_spec, shown
+from fingergait.hand.importer import Finger, Hand, compile_spec, import_hand, load_spec, shown
 from fingergait.hand.model import hand_json, hand_spec, last_link, model_json
 from fingergait.hand.obstacle import HandError, Obstacle
+from fingergait.hand.rewrite import OURS
 
 __all__ = [
     "OURS",

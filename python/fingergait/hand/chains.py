@@ -8,7 +8,6 @@ import numpy as np
 from fingergait.hand.facts import Facts
 from fingergait.hand.obstacle import Notes
 
-
 NAMELESS = "fingergait_nameless_"
 """What the names begin with that the importer gives to what has none."""
 
@@ -187,6 +186,12 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
     """Name of a geom, or of what it is part of."""
     name = str(model.geom(geom).name)
     return f"a {_kind(model, geom)} of {_body(model, geom)}" if name.startswith(NAMELESS) else name
+
+
+def joint_name(model: mujoco.MjModel, joint: int) -> str:
+    """Name of a joint, or of the body that it moves."""
+    name = str(model.joint(joint).name)
+    return f"of {model.body(int(model.jnt_bodyid[joint])).name}" if name.startswith(NAMELESS) else name
 
 
 def _kind(model: mujoco.MjModel, geom: int) -> str:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from fingergait.hand.chains import Chain
+from fingergait.hand.facts import Facts
 from fingergait.hand.obstacle import Notes
 
 _STIFF = (0.01, 1.0)  # solref of equalities that the importer adds
@@ -13,20 +14,28 @@ _STIFF = (0.01, 1.0)  # solref of equalities that the importer adds
 
 @dataclass(frozen=True)
 class Coupling:
-    """`follower` is at `ratio` times the angle of `leader` plus `offset`, rad. `tendon`: the one that drives both, whose
-    equality the importer adds; -1 where the model has one itself."""
+    """`follower` is at `ratio` times the angle of `leader` plus `offset`, rad. `tendon`: the one that drives both,
+    whose equality the importer adds; -1 where the model has one itself. `stated`: by the facts, its equality is added too."""
 
     follower: int
     leader: int
     ratio: float
     offset: float
     tendon: int = -1
+    stated: bool = False
 
 
-def find_couplings(model: mujoco.MjModel, chains: list[Chain], notes: Notes) -> list[Coupling]:
+def find_couplings(model: mujoco.MjModel, chains: list[Chain], facts: Facts, notes: Notes) -> list[Coupling]:
     """The couplings of all fingers' joints; what can't be one is an obstacle."""
     finger = {joint: k for k, chain in enumerate(chains) for joint in chain.joints}
-    couplings = [c for e in range(model.neq) if (c := _equality(model, e, finger, notes)) is not None]
+    couplings = _stated(model, finger, facts, notes)
+    for equality in range(model.neq):
+        coupling = _equality(model, equality, finger, notes)
+        if coupling is not None and coupling.follower in {c.follower for c in couplings}:
+            where = f"the joint {model.joint(coupling.follower).name}"
+            notes.obstacle(where, "one joint that it follows", "two", "take one of the equalities out")
+        elif coupling is not None:
+            couplings.append(coupling)
     known = {coupling.follower for coupling in couplings}
     for actuator in range(model.nu):
         if model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_TENDON:
@@ -34,6 +43,21 @@ def find_couplings(model: mujoco.MjModel, chains: list[Chain], notes: Notes) -> 
             known |= {coupling.follower for coupling in couplings}
     for tendon in range(model.ntendon):
         _refuse_spring(model, tendon, finger, notes)
+    return couplings
+
+
+def _stated(model: mujoco.MjModel, finger: dict[int, int], facts: Facts, notes: Notes) -> list[Coupling]:
+    """What the facts say."""
+    couplings = []
+    for name, own in facts.joints.items():
+        if own.follows is None:
+            continue
+        ids = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, n) for n in (name, own.follows)]
+        if ids[0] < 0 or ids[1] < 0 or ids[0] == ids[1] or finger.get(ids[0], -1) != finger.get(ids[1], -2):
+            expected = "another joint of the same finger"
+            notes.obstacle(f"facts: joints.{name}.follows", expected, repr(own.follows), "correct the name")
+        else:
+            couplings.append(Coupling(ids[0], ids[1], own.ratio, own.offset, stated=True))
     return couplings
 
 
@@ -103,15 +127,20 @@ def _driven(
 
 def _refuse_spring(model: mujoco.MjModel, tendon: int, finger: dict[int, int], notes: Notes) -> None:
     first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
-    if not any(int(model.wrap_objid[w]) in finger for w in range(first, first + count)):
+    wraps = range(first, first + count)
+    fixed = all(model.wrap_type[w] == mujoco.mjtWrap.mjWRAP_JOINT for w in wraps)
+    if fixed and not any(int(model.wrap_objid[w]) in finger for w in wraps):
         return
     where = f"the tendon {model.tendon(tendon).name or tendon}"
     for what, value in (
         ("stiffness", model.tendon_stiffness[tendon]),
         ("damping", model.tendon_damping[tendon]),
         ("frictionloss", model.tendon_frictionloss[tendon]),
+        ("armature", model.tendon_armature[tendon]),
+        ("stiffness polynomial", model.tendon_stiffnesspoly[tendon]),
+        ("force limit", model.tendon_actfrclimited[tendon]),
     ):
-        if float(np.max(value)) > 0.0:
+        if float(np.max(np.abs(value))) > 0.0:
             remedy = f"give its joints {what} of their own, or take it out"
             notes.obstacle(where, f"a tendon without {what}", f"{float(np.max(value)):g}", remedy)
     if model.tendon_limited[tendon]:

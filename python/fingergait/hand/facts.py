@@ -9,6 +9,7 @@ pose = [0, 0, 0.1, 0, 0, 0]       # of the model in the world: m and rotation ve
 [joints.ffj0]
 torque = [-0.3, 0.5]              # lag, damping, reference, range likewise
 held = 0.2                        # rad: fixed there, no joint of a finger
+follows = "ffj1"                  # at `ratio` (1) times that joint's angle plus `offset` (0), rad
 
 [tip.ff_tip]
 centre = [0, 0, 0.029]            # m, in the frame of the tip's body
@@ -34,7 +35,7 @@ Limits = Annotated[tuple[float, float], Field(description="lower and upper")]
 
 class JointFacts(Table):
     """Facts of one joint: torque limits (N m), motor lag (s), damping (N m s/rad), posture (rad), range (rad); or the
-    angle (rad) at which it is held."""
+    angle (rad) at which it is held; or the joint that it follows, ratio and offset (rad)."""
 
     torque: Positive | Limits | None = None
     lag: NonNegative | None = None
@@ -42,11 +43,16 @@ class JointFacts(Table):
     reference: float | None = None
     range: Limits | None = None
     held: float | None = None
+    follows: str | None = None
+    ratio: float = 1.0
+    offset: float = 0.0
 
     @model_validator(mode="after")
     def _orders(self) -> Self:
         if isinstance(self.torque, tuple) and not self.torque[0] < 0.0 < self.torque[1]:
             raise ValueError("expected torque limits [lower < 0, upper > 0]")
+        if self.ratio == 0.0:
+            raise ValueError("expected a ratio that is not 0")
         if self.range is not None and not self.range[0] < self.range[1]:
             raise ValueError("expected a range [lower, upper] with lower < upper")
         return self

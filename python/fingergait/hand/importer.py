@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
-from fingergait.hand.chains import NAMELESS, Chain, find_chains, geom_name
+from fingergait.hand.chains import Chain, find_chains, geom_name
 from fingergait.hand.couplings import Coupling, find_couplings
 from fingergait.hand.facts import Facts, facts_beside
-from fingergait.hand.motors import Motor, gear_at, motor_of
+from fingergait.hand.motors import Motor, gear_at, motor_of, refuse_transmissions, tendon_share
 from fingergait.hand.obstacle import Notes
+from fingergait.hand.placing import name_everything, place
+from fingergait.hand.rewrite import OURS, rewrite
+from fingergait.hand.standing import part_what_stands_in_each_other
 from fingergait.hand.tips import TipSphere, fit_tip
 
 Array = NDArray[np.float64]
-
-OURS = "fingergait"
-"""What the names begin with that the importer and the scene give."""
 
 
 @dataclass(frozen=True)
@@ -104,71 +104,28 @@ def import_hand(path: Path, facts: Path | None = None, pose: tuple[float, ...] |
     notes, source = Notes(), shown(path)
     spec = load_spec(path)
     spec.compiler.discardvisual = False  # or the spheres of the tips would go
-    _name_everything(spec)
+    name_everything(spec)
     placed = pose if pose is not None else known.pose
     if placed is not None:
-        _place(spec, placed)
+        place(spec, placed)
     before = compile_spec(spec, source)
     chains, held = find_chains(before, known, notes)
     notes.settle(source)
     _check_joints(before, chains, known, notes)
-    couplings = find_couplings(before, chains, notes)
+    couplings = find_couplings(before, chains, known, notes)
     for name in known.joints:
         if mujoco.mj_name2id(before, mujoco.mjtObj.mjOBJ_JOINT, name) < 0:
             notes.obstacle(f"facts: joints.{name}", "a joint of the model", "none of that name", "correct the name")
+    refuse_transmissions(before, chains, notes)
     motors = _motors(before, chains, couplings, known, notes)
+    _check_springs(before, couplings, motors, notes)
     notes.settle(source)
     spheres = [fit_tip(before, chain.tip, chain.joints[-1]) for chain in chains]
     spheres = [_stated(before, chain, sphere, known) for chain, sphere in zip(chains, spheres, strict=True)]
-    _rewrite(spec, before, chains, held, couplings, motors, spheres, known, notes)
+    rewrite(spec, before, chains, held, couplings, motors, spheres, known, notes)
+    part_what_stands_in_each_other(spec, compile_spec(spec, source), notes)
     model = compile_spec(spec, source)
     return _hand(source, spec, model, before, chains, couplings, motors, spheres, known, notes)
-
-
-def _name_everything(spec: mujoco.MjSpec) -> None:
-    """Gives what has no name one of ours, so that it can be found again after the model has changed."""
-    for kind, items in (("joint", spec.joints), ("geom", spec.geoms), ("body", spec.bodies)):
-        taken = {item.name for item in items}
-        for number, item in enumerate(items):
-            if not item.name and not (kind == "body" and item == spec.worldbody):
-                name = f"{NAMELESS}{kind}_{number}"
-                while name in taken:
-                    name += "_"
-                taken.add(name)
-                item.name = name
-
-
-def _place(spec: mujoco.MjSpec, pose: tuple[float, ...]) -> None:
-    """Moves the whole model to `pose` in the world."""
-    turn = np.empty(4)
-    angle = float(np.linalg.norm(pose[3:]))
-    mujoco.mju_axisAngle2Quat(turn, np.array(pose[3:]) / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0]), angle)
-    compiled = spec.compile()
-    data = mujoco.MjData(compiled)
-    mujoco.mj_kinematics(compiled, data)
-    for body in spec.bodies:
-        if body.parent == spec.worldbody:
-            number = compiled.body(body.name).id
-            _set_pose(body, *_moved(pose, turn, data.xpos[number], data.xquat[number]))
-    for geom in spec.worldbody.geoms:
-        number = compiled.geom(geom.name).id
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, data.geom_xmat[number])
-        if geom.type != mujoco.mjtGeom.mjGEOM_MESH:
-            geom.fromto = np.full(6, np.nan)
-            _set_pose(geom, *_moved(pose, turn, data.geom_xpos[number], quaternion))
-
-
-def _set_pose(element: object, position: Array, quaternion: Array) -> None:
-    element.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT  # type: ignore[attr-defined]
-    element.pos, element.quat = position, quaternion  # type: ignore[attr-defined]
-
-
-def _moved(pose: tuple[float, ...], turn: Array, position: Array, quaternion: Array) -> tuple[Array, Array]:
-    p, q = np.empty(3), np.empty(4)
-    mujoco.mju_rotVecQuat(p, position, turn)
-    mujoco.mju_mulQuat(q, turn, quaternion)
-    return p + np.array(pose[:3]), q
 
 
 def _check_joints(model: mujoco.MjModel, chains: list[Chain], facts: Facts, notes: Notes) -> None:
@@ -208,15 +165,46 @@ def _motors(
                     name = model.joint(joint).name
                     notes.change(f"{name} follows another joint: its own actuator is taken out")
                 continue
-            # A tendon that drives followers too pulls the leader with all of its shares.
-            shares = 1.0
+            # A tendon that drives followers too pulls at the leader with all its shares.
+            tendons: dict[int, float] = {}
             for c in couplings:
                 if c.leader == joint and c.tendon >= 0:
-                    shares += c.ratio * c.ratio
-            motor = motor_of(model, joint, shares, facts, notes)
+                    own = tendons.get(c.tendon, tendon_share(model, c.tendon, joint))
+                    tendons[c.tendon] = own + c.ratio * tendon_share(model, c.tendon, c.follower)
+            motor = motor_of(model, joint, tendons, facts, notes)
             if motor is not None:
                 motors[joint] = motor
     return motors
+
+
+def _check_springs(model: mujoco.MjModel, couplings: list[Coupling], motors: dict[int, Motor], notes: Notes) -> None:
+    """Refuses springs that the motors can't hold everywhere, and what has no linear spring or damper."""
+    leaders = {c.follower: c for c in couplings}
+    for joint in {*motors, *leaders}:
+        name, dof = model.joint(joint).name, int(model.jnt_dofadr[joint])
+        where = f"the joint {name}"
+        if np.any(model.jnt_stiffnesspoly[joint]) or np.any(model.dof_dampingpoly[dof]):
+            found = "one with a polynomial"
+            notes.obstacle(where, "a linear spring and damper", found, "give it stiffness and damping as one number")
+        stiffness = float(model.jnt_stiffness[joint])
+        if stiffness <= 0.0:
+            continue
+        rest = float(model.qpos_spring[model.jnt_qposadr[joint]])
+        pull = sorted(stiffness * (float(angle) - rest) for angle in model.jnt_range[joint])
+        leader, ratio = joint, 1.0
+        while leader in leaders:
+            ratio, leader = ratio * leaders[leader].ratio, leaders[leader].leader
+        low, high = sorted(torque * ratio for torque in pull)
+        motor = motors.get(leader)
+        if motor is not None and not (motor.low < low and high < motor.high):
+            notes.obstacle(
+                where,
+                f"a spring (stiffness {stiffness:g} N m/rad, springref {rest:g} rad) that its motor can hold",
+                f"{low:.2f} to {high:.2f} N m over its range, of {motor.low:g} to {motor.high:g} N m of the motor",
+                f"make the spring softer, or narrow the range: [joints.{name}] range = [<lower>, <upper>]  # rad",
+            )
+        else:
+            notes.change(f"{name}: its spring of {stiffness:g} N m/rad is compensated by its motor")
 
 
 def _stated(model: mujoco.MjModel, chain: Chain, sphere: TipSphere, facts: Facts) -> TipSphere:
@@ -227,94 +215,6 @@ def _stated(model: mujoco.MjModel, chain: Chain, sphere: TipSphere, facts: Facts
             stated = facts.tip[name]
             return TipSphere(np.array(stated.centre), stated.radius, sphere.error)
     return sphere
-
-
-def _rewrite(
-    spec: mujoco.MjSpec,
-    before: mujoco.MjModel,
-    chains: list[Chain],
-    held: list[int],
-    couplings: list[Coupling],
-    motors: dict[int, Motor],
-    spheres: list[TipSphere],
-    facts: Facts,
-    notes: Notes,
-) -> None:
-    """Makes the model what the hand is: joints held, torque motors, tips marked, nothing that acts unseen."""
-    for element in (*spec.actuators, *spec.sensors, *spec.keys):
-        spec.delete(element)
-    names = {before.joint(j).name for j in held}
-    for equality in list(spec.equalities):
-        if equality.name1 in names or equality.name2 in names:
-            notes.change(f"the equality of {equality.name1} is taken out: its joint is held")
-            spec.delete(equality)
-    for tendon in list(spec.tendons):
-        # What they drive is coupled or has a motor of its own now.
-        spec.delete(tendon)
-    for coupling in couplings:
-        if coupling.tendon >= 0:
-            follower, leader = before.joint(coupling.follower).name, before.joint(coupling.leader).name
-            data = np.zeros(mujoco.mjNEQDATA)
-            data[1] = coupling.ratio
-            equality = spec.add_equality(
-                name=f"{OURS}_{follower}", type=mujoco.mjtEq.mjEQ_JOINT, name1=follower, name2=leader, data=data
-            )
-            equality.objtype = mujoco.mjtObj.mjOBJ_JOINT
-    for joint in held:
-        name = before.joint(joint).name
-        angle = facts.of(name).held
-        _hold(spec, before, joint, angle or 0.0)
-        why = "is in no finger alone: it " if angle is None else ""
-        notes.change(f"the joint {name} {why}is held at {angle or 0.0:g}")
-    for body in spec.bodies:
-        if body.gravcomp:
-            notes.change(f"gravcomp of {body.name} is taken out: the controller holds the fingers' weight")
-            body.gravcomp = 0.0
-    for joint, motor in motors.items():
-        name = before.joint(joint).name
-        element = spec.joint(name)
-        own = facts.of(name)
-        if own.range is not None:
-            element.range, element.limited = list(own.range), mujoco.mjtLimited.mjLIMITED_TRUE
-        if own.damping is not None:
-            element.damping[0] = own.damping
-        element.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-        actuator = spec.add_actuator(name=f"{OURS}_{name}", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
-        actuator.gainprm[0] = 1.0
-        actuator.forcelimited, actuator.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, [motor.low, motor.high]
-        if motor.lag > 0.0:
-            actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-            actuator.dynprm[0] = motor.lag
-            actuator.actlimited, actuator.actrange = mujoco.mjtLimited.mjLIMITED_TRUE, [motor.low, motor.high]
-    for number, (chain, sphere) in enumerate(zip(chains, spheres, strict=True)):
-        body = spec.body(before.body(int(before.geom_bodyid[chain.tip])).name)
-        body.add_geom(
-            name=f"{OURS}_tip_{number}",
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            pos=sphere.centre,
-            size=[sphere.radius, 0.0, 0.0],
-            contype=0,
-            conaffinity=0,
-            mass=0.0,
-            group=5,
-        )
-
-
-def _hold(spec: mujoco.MjSpec, before: mujoco.MjModel, joint: int, angle: float) -> None:
-    """Takes a joint out with its body turned to `angle`, rad."""
-    element = spec.joint(before.joint(joint).name)
-    body = spec.body(before.body(int(before.jnt_bodyid[joint])).name)
-    if angle and before.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
-        turn, quaternion, offset = np.empty(4), np.empty(4), np.empty(3)
-        number = int(before.jnt_bodyid[joint])
-        mujoco.mju_axisAngle2Quat(turn, before.jnt_axis[joint], angle - before.qpos0[before.jnt_qposadr[joint]])
-        mujoco.mju_rotVecQuat(offset, before.jnt_pos[joint], turn)
-        shift = before.jnt_pos[joint] - offset
-        mujoco.mju_rotVecQuat(offset, shift, before.body_quat[number])
-        mujoco.mju_mulQuat(quaternion, before.body_quat[number], turn)
-        _set_pose(body, before.body_pos[number] + offset, quaternion)
-    spec.delete(element)
 
 
 def _hand(
@@ -356,26 +256,12 @@ def _hand(
                 f"the tip of {chain.name} is no sphere: one of {1e3 * sphere.radius:.1f} mm is off by up to "
                 f"{1e3 * sphere.error:.1f} mm; [tip.{geom_name(before, chain.tip)}] centre, radius say better"
             )
-    _standing_in_each_other(model, notes)
     renumbered = {
         now(c.follower): Coupling(now(c.follower), now(c.leader), c.ratio, c.offset, c.tendon) for c in couplings
     }
     return Hand(
         source, spec, model, tuple(fingers), renumbered, references, tuple(notes.changes), tuple(notes.warnings)
     )
-
-
-def _standing_in_each_other(model: mujoco.MjModel, notes: Notes) -> None:
-    """Warns of parts that stand in each other with every joint in the middle of its range."""
-    data = mujoco.MjData(model)
-    for joint in range(model.njnt):
-        if model.jnt_limited[joint]:
-            data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint].mean()
-    mujoco.mj_forward(model, data)
-    for contact in data.contact[: data.ncon]:
-        if contact.dist < -1e-3:
-            a, b = (geom_name(model, int(g)) for g in contact.geom)
-            notes.warn(f"{a} and {b} stand {-1e3 * contact.dist:.1f} mm in each other with the joints in mid-range")
 
 
 def _line(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""The hand model that the compiled core reads, as JSON text: kinematics, inertia, motors and tips of an imported hand."""
+"""The hand model that the compiled core reads, as JSON text: kinematics, inertia, motors and tips of a hand."""
 
 import json
 from pathlib import Path
@@ -100,7 +100,7 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def _welded_body(model: mujoco.MjModel, body: int) -> tuple[float, Array, Array]:
-    """Mass, centre of mass (3,) and inertia (3, 3) about it, in the frame of `body`, of it with all that is fixed to it."""
+    """Mass, centre of mass (3,) and inertia (3, 3) about it of `body` with all that is fixed to it, in its frame."""
     parts = []
     for other in range(model.nbody):
         if model.body_weldid[other] != body:

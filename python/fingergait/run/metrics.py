@@ -29,7 +29,9 @@ class Timing:
     solver: dict[str, int] = field(default_factory=dict)
 
 
-def metrics_of(log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: Array | float) -> dict[str, Any]:
+def metrics_of(
+    log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: Array | float
+) -> dict[str, Any]:
     """The figures of `fingergait run --json`, without paths, versions and simulator settings.
 
     `lost` says why the object was lost, if it was; `tau_max` is the torque limit of each joint, (n_q,) or one for all, N m.
