@@ -94,8 +94,8 @@ class Measurement:
         contact_force: ArrayLike,
     ) -> Measurement:
         """t in s; q, tau (n_fingers, n_joints) or (n_q,); pose (7,): position and wxyz quaternion of O in W;
-        contact_place (n_fingers, 3): tactile contact in the fingertip frame F, m; contact_force (n_fingers,): normal force, N, zero
-        where there is no contact."""
+        contact_place (n_fingers, 3): tactile contact in the fingertip frame F, m; contact_force (n_fingers,): normal
+        force, N, zero where there is no contact."""
 
 @final
 class Reference:

@@ -15,7 +15,7 @@ _STIFF = (0.01, 1.0)  # solref of equalities that the importer adds
 @dataclass(frozen=True)
 class Coupling:
     """`follower` is at `ratio` times the angle of `leader` plus `offset`, rad. `tendon`: the one that drives both,
-    whose equality the importer adds; -1 where the model has one itself. `stated`: by the facts, its equality is added too."""
+    whose equality the importer adds; -1 where the model has one itself. `stated`: by the facts, added too."""
 
     follower: int
     leader: int

@@ -118,7 +118,7 @@ def import_hand(path: Path, facts: Path | None = None, pose: tuple[float, ...] |
             notes.obstacle(f"facts: joints.{name}", "a joint of the model", "none of that name", "correct the name")
     refuse_transmissions(before, chains, notes)
     motors = _motors(before, chains, couplings, known, notes)
-    _check_springs(before, couplings, motors, notes)
+    _check_springs(before, couplings, motors, known, notes)
     notes.settle(source)
     spheres = [fit_tip(before, chain.tip, chain.joints[-1]) for chain in chains]
     spheres = [_stated(before, chain, sphere, known) for chain, sphere in zip(chains, spheres, strict=True)]
@@ -177,7 +177,9 @@ def _motors(
     return motors
 
 
-def _check_springs(model: mujoco.MjModel, couplings: list[Coupling], motors: dict[int, Motor], notes: Notes) -> None:
+def _check_springs(
+    model: mujoco.MjModel, couplings: list[Coupling], motors: dict[int, Motor], facts: Facts, notes: Notes
+) -> None:
     """Refuses springs that the motors can't hold everywhere, and what has no linear spring or damper."""
     leaders = {c.follower: c for c in couplings}
     for joint in {*motors, *leaders}:
@@ -190,7 +192,7 @@ def _check_springs(model: mujoco.MjModel, couplings: list[Coupling], motors: dic
         if stiffness <= 0.0:
             continue
         rest = float(model.qpos_spring[model.jnt_qposadr[joint]])
-        pull = sorted(stiffness * (float(angle) - rest) for angle in model.jnt_range[joint])
+        pull = sorted(stiffness * (float(angle) - rest) for angle in facts.of(name).range or model.jnt_range[joint])
         leader, ratio = joint, 1.0
         while leader in leaders:
             ratio, leader = ratio * leaders[leader].ratio, leaders[leader].leader

@@ -163,7 +163,7 @@ def _within(low: float, high: float, gain: float, span: NDArray[np.float64]) -> 
 
 
 def _integrates(model: mujoco.MjModel, actuator: int) -> bool:
-    return mujoco.mjtDyn.mjDYN_INTEGRATOR == int(model.actuator_dyntype[actuator])
+    return bool(mujoco.mjtDyn.mjDYN_INTEGRATOR == int(model.actuator_dyntype[actuator]))
 
 
 def _narrow(model: mujoco.MjModel, actuator: int) -> bool:
@@ -171,12 +171,10 @@ def _narrow(model: mujoco.MjModel, actuator: int) -> bool:
     if not (model.actuator_ctrllimited[actuator] and model.actuator_forcelimited[actuator]):
         return False
     gain = abs(float(model.actuator_gainprm[actuator, 0]))
-    plain = mujoco.mjtBias.mjBIAS_NONE == int(model.actuator_biastype[actuator])
-    return bool(
-        plain
-        and gain * model.actuator_ctrlrange[actuator, 1] < model.actuator_forcerange[actuator, 1]
-        or gain * model.actuator_ctrlrange[actuator, 0] > model.actuator_forcerange[actuator, 0]
-    )
+    if mujoco.mjtBias.mjBIAS_NONE != int(model.actuator_biastype[actuator]):
+        return False
+    asked, given = gain * model.actuator_ctrlrange[actuator], model.actuator_forcerange[actuator]
+    return bool(asked[1] < given[1] or asked[0] > given[0])
 
 
 def _kind(model: mujoco.MjModel, actuator: int) -> str:

@@ -40,13 +40,14 @@ def part_what_stands_in_each_other(spec: mujoco.MjSpec, model: mujoco.MjModel, n
         if posture == 0:
             middle = deep
     for pair, depth in middle.items():
-        a, b = (geom_name(model, g) for g in parts[pair])
+        first, second = (geom_name(model, g) for g in parts[pair])
+        where = f"{first} and {second} stand {1e3 * depth:.1f} mm in each other"
         if pair in always:
             bodies = [model.body(body).name for body in pair]
             spec.add_exclude(bodyname1=bodies[0], bodyname2=bodies[1])
-            notes.change(f"{a} and {b} stand {1e3 * depth:.1f} mm in each other at every posture: they no longer touch")
+            notes.change(f"{where} at every posture: they no longer touch")
         else:
-            notes.warn(f"{a} and {b} stand {1e3 * depth:.1f} mm in each other with the joints in mid-range")
+            notes.warn(f"{where} with the joints in mid-range")
 
 
 def _follow(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -25,7 +25,7 @@ def fit_tip(model: mujoco.MjModel, geom: int, joint: int) -> TipSphere:
     """The sphere that fits the outer cap of `geom`, away from the last joint before it.
 
     Spheres and capsules are exact. Other shapes are sampled on their surface: a sphere is fitted by least squares to
-    the points within half of its radius of the outermost one, along the line from the joint, until it no longer changes.
+    the points within half of its radius of the outermost one, along the line from the joint, until it stands still.
     """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     position, rotation = model.geom_pos[geom].copy(), _matrix(model.geom_quat[geom])

@@ -34,7 +34,8 @@ def metrics_of(
 ) -> dict[str, Any]:
     """The figures of `fingergait run --json`, without paths, versions and simulator settings.
 
-    `lost` says why the object was lost, if it was; `tau_max` is the torque limit of each joint, (n_q,) or one for all, N m.
+    `lost` says why the object was lost, if it was; `tau_max` is the torque limit of each joint, (n_q,) or one,
+    N m.
     """
     t = log.t
     errors = pose_errors(log.pose("object"), log.pose("desired"))  # (T, 6)

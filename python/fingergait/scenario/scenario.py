@@ -40,8 +40,8 @@ class SupportConfig(Table):
 
 
 class ObjectConfig(Table):
-    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg); nominal pose at the
-    start [x, y, z, rx, ry, rz] in the world, m and rotation vector (absent: upright amid the fingers, on the palm)."""
+    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg); nominal pose
+    at the start [x, y, z, rx, ry, rz] in W, m and rotation vector (absent: upright amid the fingers, on the palm)."""
 
     shape: Literal["cylinder", "ellipsoid", "box", "cone"] = "cylinder"
     size: tuple[float, ...] = (0.025, 0.06)

@@ -176,8 +176,8 @@ def _which(finger: int | None) -> slice | int:
 
 def _check(fault: kinds.FaultWindow, number: int, joints: list[slice]) -> None:
     finger = getattr(fault, "finger", None)
-    known = finger is not None and finger < len(joints)
-    count_joints = joints[finger].stop - joints[finger].start if known else max(j.stop - j.start for j in joints)
+    counts = [own.stop - own.start for own in joints]
+    count_joints = counts[finger] if finger is not None and finger < len(joints) else max(counts)
     for field, count in (("finger", len(joints)), ("joint", count_joints), ("other", count_joints)):
         value = getattr(fault, field, None)
         if value is not None and value >= count:

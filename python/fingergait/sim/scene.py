@@ -23,9 +23,10 @@ class SceneModel:
     """A compiled scene and where its parts are.
 
     `hand`: what the importer made of the hand's file. `q`, `v`: addresses of the independent joints' positions and
-    velocities, finger by finger; `act`: their motors; `joints`: where each finger's are in these. `object_q`: address of
-    the object's pose in qpos; `object_body`: its body; `tips`: the sphere that stands for each fingertip; `links`: each
-    finger's last link's body; `touch`: address of each tip's contact sensor; `substeps`: physics steps a control step.
+    velocities, finger by finger; `act`: their motors; `joints`: where each finger's are in these. `object_q`: address
+    of the object's pose in qpos; `object_body`: its body; `tips`: the sphere that stands for each fingertip;
+    `links`: each finger's last link's body; `touch`: address of each tip's contact sensor; `substeps`: physics steps a
+    control step.
     """
 
     model: mujoco.MjModel
@@ -88,7 +89,7 @@ def build_scene(scenario: Scenario) -> SceneModel:
     if scenario.truth.motor_lag_s is not None:
         if not lagging.all():
             raise ConfigError(
-                "truth.motor_lag_s: expected motors with a lag, found some without; state one in the facts file: lag = ..."
+                "truth.motor_lag_s: expected motors with a lag, found some without; write in the facts file: lag = <s>"
             )
         model.actuator_dynprm[motors, 0] = scenario.truth.motor_lag_s
     ends = np.cumsum([len(finger.joints) for finger in fingers]).tolist()
@@ -148,7 +149,7 @@ def settings(scene: SceneModel, scenario: Scenario) -> dict[str, Any]:
 def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: Hand) -> None:
     """Adds the true object as a free body, and the support if there is one.
 
-    Its contacts are as stiff as the first fingertip says, and it touches every part of the hand that can touch anything.
+    Its contacts are as stiff as the first fingertip says, and it touches each part of the hand that can touch anything.
     """
     truth, shape, tip = scenario.truth, scenario.object.geometry, hand.fingers[0].tip
     model = hand.model

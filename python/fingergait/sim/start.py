@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from fingergait._core import ConfigError
 from fingergait.scenario import Scenario
@@ -18,6 +19,7 @@ Array = NDArray[np.float64]
 
 _DEPTH = 1e-5  # m: how far a tip stands in the object at the start, so that it touches
 _TOLERANCE = 1e-6  # m: of the inverse kinematics
+_TOUCH_WEIGHT = 1e4  # of touching, against being near the place wished for
 
 
 @dataclass(frozen=True)
@@ -31,15 +33,16 @@ class Start:
 def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     """Object pose, joint angles and motor torques that a run of this scenario starts from.
 
-    With `object.pose` and `grasp.joints` these are the start, the object off by `truth.first_grasp`. Otherwise the object
-    stands upright amid the fingers' bases, on the palm, and each tip touches its side at the azimuth of the finger's base,
-    off by `truth.finger_offset_deg`, and at the height `grasp.height` above O, off by `truth.finger_height_offset`, all
-    about the object where it really stands.
+    With `object.pose` and `grasp.joints` these are the start, the object off by `truth.first_grasp`. Otherwise the
+    object stands upright amid the fingers' bases, on the palm, and each tip touches its side at the azimuth of the
+    finger's base, off by `truth.finger_offset_deg`, and at the height `grasp.height` above O, off by
+    `truth.finger_height_offset`, all about the object where it really stands. A finger that can't get there touches as
+    near to it as it can.
 
     Raises
     ------
     ConfigError
-        Where a finger can't reach its contact within its joint limits, the object stands in a finger's link, or a list
+        Where a finger can't touch the object within its joint limits, a motor can't hold its finger, the object stands in a finger's link, or a list
         has the wrong length.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
@@ -172,13 +175,42 @@ def _reach(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) ->
         moved = data.qpos[scene.q].copy()
         moved[scene.joints[index]] = np.clip(data.qpos[q] + np.clip(step, -0.3, 0.3), lower, upper)
         _set_joints(scene, data, moved)
-    place = ", ".join(f"{1e3 * x:.1f}" for x in target)
-    found = f"one at ({place}) mm, {1e3 * np.linalg.norm(error):.1f} mm out of reach"
-    raise ConfigError(f"object.size: expected an object whose side finger {finger.name} can touch, found {found}")
+    _touch_near(scene, data, index, target)
+
+
+def _touch_near(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) -> None:
+    """Moves finger `index` so that its tip touches the object as near to `target` as it can."""
+    model, finger, own = scene.model, scene.fingers[index], scene.joints[index]
+    tip, geom = int(scene.tips[index]), int(model.geom(OBJECT).id)
+    lower, upper = model.jnt_range[list(finger.joints)].T
+
+    def away(q: Array) -> Array:
+        moved = data.qpos[scene.q].copy()
+        moved[own] = q
+        _set_joints(scene, data, moved)
+        mujoco.mj_kinematics(model, data)
+        apart = _distance(model, data, tip, geom) + _DEPTH
+        return np.array([_TOUCH_WEIGHT * apart, *(data.geom_xpos[tip] - target)])
+
+    starts = [0.5 * (lower + upper), np.clip(data.qpos[scene.q][own], lower, upper)]
+    inset = 1e-6 * (upper - lower)  # the solver starts inside of its bounds
+    found = [
+        least_squares(away, np.clip(q, lower + inset, upper - inset), bounds=(lower, upper), xtol=1e-12, ftol=1e-12)
+        for q in starts
+    ]
+    best = min(found, key=lambda answer: float(answer.cost))
+    apart = float(away(best.x)[0]) / _TOUCH_WEIGHT
+    if abs(apart) > _DEPTH / 2.0:
+        place = ", ".join(f"{1e3 * x:.1f}" for x in target)
+        off = f"one that it misses by {1e3 * abs(apart):.1f} mm on the way to ({place}) mm"
+        raise ConfigError(
+            f"object: expected an object that finger {finger.name} can touch, found {off}; object.pose, object.size and "
+            "grasp.height say where it is, grasp.joints how the fingers stand"
+        )
 
 
 def _independent(scene: SceneModel, columns: Array) -> Array:
-    """Columns (..., nv) of all joints as those (..., n_q) of the independent ones: followers move with their leaders."""
+    """Columns (..., nv) of all joints as those (..., n_q) of the independent ones, which move their followers."""
     dofs = scene.model.jnt_dofadr
     out: Array = columns[..., scene.v].copy()
     place = {int(dof): k for k, dof in enumerate(scene.v)}
@@ -218,5 +250,17 @@ def _hold(scene: SceneModel, data: mujoco.MjData, middle: Array, press: float) -
         own = scene.joints[index]
         norm = max(float(np.linalg.norm(inward)), 1e-9)
         torque[own] += _independent(scene, jacobian)[:, own].T @ (press * inward / norm)
+    _check_torques(scene, torque)
+    return torque
+
+
+def _check_torques(scene: SceneModel, torque: Array) -> None:
+    """Refuses a start that a motor can't hold."""
     low, high = torque_limits(scene)
-    return np.clip(torque, low, high)
+    names = [scene.model.joint(joint).name for joint in _joints(scene)]
+    for name, wanted, least, most in zip(names, torque, low, high, strict=True):
+        if not least <= wanted <= most:
+            raise ConfigError(
+                f"the motor of {name}: expected one that holds its finger at the start, which takes {wanted:.3g} N m with "
+                f"the finger's weight, springs and grasp.press, found one of {least:g} to {most:g} N m"
+            )
