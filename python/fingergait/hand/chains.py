@@ -191,8 +191,9 @@ def geom_name(model: mujoco.MjModel, geom: int) -> str:
 def joint_name(model: mujoco.MjModel, joint: int) -> str:
     """Name of a joint, or of the body that it moves."""
     name = str(model.joint(joint).name)
-    body = str(model.body(int(model.jnt_bodyid[joint])).name)
-    return f"of {body}" if name.startswith(NAMELESS) else name
+    if not name.startswith(NAMELESS):
+        return name
+    return f"of {model.body(int(model.jnt_bodyid[joint])).name}"
 
 
 def _kind(model: mujoco.MjModel, geom: int) -> str:

@@ -172,9 +172,12 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: Hand) -> None:
     mark.fromto, mark.contype, mark.conaffinity = shape.mark, 0, 0
     mark.rgba, mark.mass = np.array([0.97, 0.97, 0.97, 1.0]), 0.0
     if scenario.support.height is not None:
-        table = spec.worldbody.add_geom(name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.15, 0.15, 0.01])
-        table.pos = np.array([*scenario.support.position, scenario.support.height - 0.01])
+        # In a body of its own, behind all others: the ids of the hand's parts stay what they are.
+        stand = spec.worldbody.add_body(name=SUPPORT, pos=[*scenario.support.position, scenario.support.height - 0.01])
+        table = stand.add_geom(name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.15, 0.15, 0.01])
         table.contype, table.conaffinity = types, types
+        table.friction, table.condim = [1.0, _TORSION, _ROLLING], geom.condim
+        table.solref, table.solimp = geom.solref, geom.solimp
         table.rgba = np.array([0.75, 0.75, 0.72, 1.0])
 
 

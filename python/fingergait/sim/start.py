@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from fingergait._core import ConfigError
+from fingergait.hand import geom_name
 from fingergait.scenario import Scenario
 from fingergait.sim.scene import OBJECT, SceneModel, torque_limits
 
 Array = NDArray[np.float64]
 
 _DEPTH = 1e-5  # m: how far a tip stands in the object at the start, so that it touches
+_FAR = 0.1  # m: distances beyond are not told apart
+_DROP = 0.5  # m: how far below the fingertips the object may come to rest
 _TOLERANCE = 1e-6  # m: of the inverse kinematics
 _TOUCH_WEIGHT = 1e4  # of touching, against being near the place wished for
 
@@ -34,16 +37,16 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     """Object pose, joint angles and motor torques that a run of this scenario starts from.
 
     With `object.pose` and `grasp.joints` these are the start, the object off by `truth.first_grasp`. Otherwise the
-    object stands upright amid the fingers' bases, on the palm, and each tip touches its side at the azimuth of the
-    finger's base, off by `truth.finger_offset_deg`, and at the height `grasp.height` above O, off by
-    `truth.finger_height_offset`, all about the object where it really stands. A finger that can't get there touches as
-    near to it as it can.
+    object stands upright amid the fingertips as they are in mid-range, on what is below. Each tip touches its side at
+    the azimuth that it has in mid-range, off by `truth.finger_offset_deg`, and at the height `grasp.height` above O,
+    off by `truth.finger_height_offset`, all about the object where it really stands. A finger that can't get there
+    touches as near to it as it can.
 
     Raises
     ------
     ConfigError
-        Where a finger can't touch the object within its joint limits, a motor can't hold its finger, the object stands in a finger's link, or a list
-        has the wrong length.
+        Where a finger can't touch the object within its joint limits, a motor can't hold its finger, the object stands
+        in a finger's link, or a list has the wrong length.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     n = len(scene.fingers)
@@ -53,7 +56,7 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     mujoco.mj_kinematics(model, data)
     data.qpos[scene.object_q : scene.object_q + 7] = _object_pose(scene, data, scenario)
     mujoco.mj_kinematics(model, data)
-    _raise_onto_palm(scene, data)
+    _rest(scene, data, lower=scenario.object.pose is None)
     middle = data.xpos[scene.object_body].copy()
     if scenario.grasp.joints is not None:
         if len(scenario.grasp.joints) != len(scene.q):
@@ -63,10 +66,9 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
         mujoco.mj_kinematics(model, data)
         _check_clear(scene, data)
         return Start(data.qpos.copy(), _hold(scene, data, middle, scenario.grasp.press))
-    hub = data.xanchor[[finger.joints[0] for finger in scene.fingers]].mean(axis=0)
-    for index, finger in enumerate(scene.fingers):
-        base = data.xanchor[finger.joints[0]]
-        azimuth = np.arctan2(base[1] - hub[1], base[0] - hub[0]) + turns[index]
+    tips = data.geom_xpos[scene.tips] - data.geom_xpos[scene.tips].mean(axis=0)
+    for index in range(n):
+        azimuth = np.arctan2(tips[index, 1], tips[index, 0]) + turns[index]
         outward = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         origin = middle + np.array([0.0, 0.0, scenario.grasp.height + heights[index]])
         target = _touching(scene, data, index, origin, outward)
@@ -102,17 +104,11 @@ def _object_pose(scene: SceneModel, data: mujoco.MjData, scenario: Scenario) -> 
         pose[:3] = nominal[:3]
         pose[3:] = _quaternion(np.array(nominal[3:]))
     else:
-        bases = data.xanchor[[finger.joints[0] for finger in scene.fingers]]
-        pose[:2] = bases[:, :2].mean(axis=0)
-        pose[2] = scenario.object.geometry.bottom + min(float(bases[:, 2].mean()), _floor(scenario))
+        pose[:3] = data.geom_xpos[scene.tips].mean(axis=0)
     pose[:3] += offset[:3]
     mujoco.mju_mulQuat(turn, _quaternion(offset[3:]), pose[3:])
     pose[3:] = turn
     return pose
-
-
-def _floor(scenario: Scenario) -> float:
-    return np.inf if scenario.support.height is None else scenario.support.height
 
 
 def _quaternion(vector: Array) -> Array:
@@ -123,22 +119,28 @@ def _quaternion(vector: Array) -> Array:
     return out
 
 
-def _raise_onto_palm(scene: SceneModel, data: mujoco.MjData) -> None:
-    """Lifts the object until it no longer stands in anything but the fingers."""
+def _rest(scene: SceneModel, data: mujoco.MjData, lower: bool) -> None:
+    """Lifts the object until it stands in nothing but the fingers, or lowers it onto what is below."""
     model = scene.model
     geom = model.geom(OBJECT).id
     static = [i for i in range(model.ngeom) if model.body_weldid[model.geom_bodyid[i]] == 0 and model.geom_contype[i]]
-    for _ in range(20):
-        depth = min((_distance(model, data, geom, other) for other in static), default=0.0)
-        if depth >= -1e-9:
+    begin, inside = float(data.qpos[scene.object_q + 2]), False
+    for _ in range(60):
+        gap = min((_distance(model, data, geom, other) for other in static), default=_FAR)
+        if gap >= -1e-9 and (inside or not lower or gap < 1e-7):
             return
-        data.qpos[scene.object_q + 2] -= depth
+        inside = inside or gap < -1e-9
+        data.qpos[scene.object_q + 2] -= gap
         mujoco.mj_kinematics(model, data)
+        if begin - data.qpos[scene.object_q + 2] > _DROP:  # nothing is below: the fingers hold it where it is
+            data.qpos[scene.object_q + 2] = begin
+            mujoco.mj_kinematics(model, data)
+            return
 
 
 def _distance(model: mujoco.MjModel, data: mujoco.MjData, a: int, b: int) -> float:
-    """Signed distance between two geoms, m, at most 0.1."""
-    return float(mujoco.mj_geomDistance(model, data, a, b, 0.1, None))
+    """Signed distance between two geoms, m, at most `_FAR`."""
+    return float(mujoco.mj_geomDistance(model, data, a, b, _FAR, None))
 
 
 def _touching(scene: SceneModel, data: mujoco.MjData, index: int, origin: Array, outward: Array) -> Array:
@@ -204,8 +206,8 @@ def _touch_near(scene: SceneModel, data: mujoco.MjData, index: int, target: Arra
         place = ", ".join(f"{1e3 * x:.1f}" for x in target)
         off = f"one that it misses by {1e3 * abs(apart):.1f} mm on the way to ({place}) mm"
         raise ConfigError(
-            f"object: expected an object that finger {finger.name} can touch, found {off}; object.pose, object.size and "
-            "grasp.height say where it is, grasp.joints how the fingers stand"
+            f"object: expected an object that finger {finger.name} can touch, found {off}; object.pose, object.size "
+            "and grasp.height say where it is, grasp.joints how the fingers stand"
         )
 
 
@@ -230,7 +232,7 @@ def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
                 continue
             depth = -_distance(model, data, geom, other)
             if model.geom_contype[other] and depth > 1e-4:
-                found = f"{1e3 * depth:.1f} mm of finger {finger.name} inside it"
+                found = f"{1e3 * depth:.1f} mm of {geom_name(model, other)} inside it"
                 raise ConfigError(f"object.size: expected an object that leaves the fingers room, found {found}")
 
 
@@ -261,6 +263,6 @@ def _check_torques(scene: SceneModel, torque: Array) -> None:
     for name, wanted, least, most in zip(names, torque, low, high, strict=True):
         if not least <= wanted <= most:
             raise ConfigError(
-                f"the motor of {name}: expected one that holds its finger at the start, which takes {wanted:.3g} N m with "
-                f"the finger's weight, springs and grasp.press, found one of {least:g} to {most:g} N m"
+                f"the motor of {name}: expected one that holds its finger at the start, which takes {wanted:.3g} N m "
+                f"with the finger's weight, springs and grasp.press, found one of {least:g} to {most:g} N m"
             )
