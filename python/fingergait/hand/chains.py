@@ -192,8 +192,8 @@ def joint_name(model: mujoco.MjModel, joint: int) -> str:
     """Name of a joint, or of the body that it moves."""
     name = str(model.joint(joint).name)
     if not name.startswith(NAMELESS):
-        return name
-    return f"of {model.body(int(model.jnt_bodyid[joint])).name}"
+        return str(name)
+    return "of " + str(model.body(int(model.jnt_bodyid[joint])).name)
 
 
 def _kind(model: mujoco.MjModel, geom: int) -> str:

@@ -187,13 +187,8 @@ def _kind(model: mujoco.MjModel, actuator: int) -> str:
 
 
 def _lag(model: mujoco.MjModel, actuator: int) -> float:
-<<<<<<< HEAD
-    kind = int(model.actuator_dyntype[actuator])
-    if kind in (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)):
-=======
     kind = int(model.actuator_dyntype[actuator])  # NumPy's own integers are in no tuple of enums
     if kind in (mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT):
->>>>>>> 8da23f6 (Read the motors' lag, and leave motors without one alone)
         return float(model.actuator_dynprm[actuator, 0])
     return 0.0
 

@@ -59,9 +59,6 @@ class MujocoPlant:
         self._open = _lags(self.scene) < 2.0 * self.scene.model.opt.timestep
         self._low, self._high = low, high
         self._tau = np.zeros(len(self.scene.q))
-        # A motor without lag gives what it is told: a loop around it would only answer its own last step.
-        lags = [motor.lag for finger in self.scene.fingers for motor in finger.motors]
-        self._ideal = np.array(lags) < self.scene.model.opt.timestep
         self.t = 0.0
         self.reset()
 
@@ -105,13 +102,8 @@ class MujocoPlant:
             data.xfrc_applied[self.scene.object_body, :3] += pull
         desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
-<<<<<<< HEAD
-            reading = faults.torque_reading(self.t, self._tau)
-            motors = self._pid.step(desired, np.where(self._ideal, desired, reading)).ravel()
-=======
             motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()
             motors = np.where(self._open, np.clip(desired, self._low, self._high), motors)
->>>>>>> 8da23f6 (Read the motors' lag, and leave motors without one alone)
             data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
             self._tau[:] = data.actuator_force[act]
