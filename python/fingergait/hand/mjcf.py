@@ -6,6 +6,7 @@ states the hand's geometry. What can't be expressed is refused in one sentence.
 """
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +32,7 @@ class Finger:
 def load_spec(path: Path) -> mujoco.MjSpec:
     """The MJCF at `path`, parsed; a parse error is one line that names the file."""
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        return mujoco.MjSpec.from_file(os.fsencode(path))  # a name may be any bytes
     except (ValueError, OSError) as error:
         raise ConfigError(
             f"hand.file: expected an MJCF that MuJoCo can read, found {path.name}: {_line(error)}"

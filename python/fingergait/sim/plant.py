@@ -55,6 +55,7 @@ class MujocoPlant:
         n, m = len(self.scene.fingers), self.scene.n_joints
         self.config = core_config(scenario, float(torque_limits(self.scene).min()))
         self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), self.config)
+        self._object_geoms, self._link_geoms = _parts(self.scene)
         self._tau = np.zeros((n, m))
         self._tau_row = self._tau.reshape(-1)
         self.t = 0.0
@@ -116,6 +117,15 @@ class MujocoPlant:
         return pose
 
     @property
+    def link_contact(self) -> bool:
+        """Whether a part of a finger other than its tip touches the object; for the log only."""
+        pairs = self.data.contact.geom
+        if not len(pairs):
+            return False
+        on_object, on_link = self._object_geoms[pairs], self._link_geoms[pairs]
+        return bool((on_object & on_link[:, ::-1]).any())
+
+    @property
     def joint_angles(self) -> Array:
         """True joint angles (n_fingers * n_joints,), rad; for the log only."""
         angles: Array = self.data.qpos[self.scene.q]
@@ -131,3 +141,15 @@ class MujocoPlant:
         arm = self.data.xpos[body] - self.data.xipos[body]
         wrench[3:] += np.cross(arm, wrench[:3])
         self.data.xfrc_applied[body] = wrench
+
+
+def _parts(scene: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """For each geom, whether it is the object's, and whether it is a part of a finger other than its tip."""
+    model = scene.model
+    joints = {int(model.jnt_bodyid[joint]) for finger in scene.fingers for joint in finger.joints}
+    moves = np.zeros(model.nbody, dtype=bool)
+    for body in range(1, model.nbody):  # parents come first
+        moves[body] = body in joints or moves[model.body_parentid[body]]
+    links = moves[model.geom_bodyid]
+    links[scene.tips] = False
+    return model.geom_bodyid == scene.object_body, links
