@@ -26,6 +26,7 @@ Watcher = Callable[[MujocoPlant, "Log"], bool | None]
 """Called about every 16 ms of simulated time; True ends the run."""
 
 _REFUSED_S = 0.5  # time at which a start that is still refused ends the run: nothing is driven, nothing will change
+_REFUSED = {"pose_frame", "tactile_axes"}
 _CHECK_EVERY = 5  # control steps between two looks at whether the object is lost
 
 
@@ -96,7 +97,7 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
             if monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
                 lost = reason(log, scene, monitor.symptom)
                 break
-            if plant.t >= _REFUSED_S and "pose_frame" in diagnostics.faults:
+            if plant.t >= _REFUSED_S and not _REFUSED.isdisjoint(diagnostics.faults):
                 break
         if watch is not None and k % watch_every == 0 and watch(plant, log):
             break

@@ -36,9 +36,13 @@ _CAUSES = {
         "the object's pose does not fit the touching fingertips: its origin is not among their contacts",
         "give the pose in the hand's frame (check the camera's calibration), and of the object that is held",
     ),
+    "tactile_axes": _Cause(
+        "the normals that the tactile sensors tell point away from each other",
+        "check the axes and signs of the contact places: they are in the fingertip's frame, from the tip's centre",
+    ),
     "tactile_scale": _Cause(
         "the tactile sensors contradict the joint torques",
-        "check their unit (N), their axes (the fingertip's frame) and the joint torques' signs",
+        "check the tactile sensors' unit (N), and unit (N m) and sign of the joint torques",
     ),
     "tactile_lost": _Cause(
         "fingertips press on something and feel nothing", "check that the tactile sensors are connected"

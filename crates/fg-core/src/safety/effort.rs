@@ -99,7 +99,6 @@ impl EffortGuard {
             self.told[j] += (told - self.told[j]) * share;
             compared += 1;
             let (felt, told) = (self.felt[j], self.told[j]);
-            if std::env::var_os("EFF").is_some() && (felt - told).abs() > 0.5 * (self.margin + self.ratio * felt.max(told)) { eprintln!("EFF {j} {felt:.2} {told:.2}"); }
             odd += usize::from((felt - told).abs() > self.margin + self.ratio * felt.max(told));
         }
         let wrong = compared >= 2 && 2 * odd > compared;

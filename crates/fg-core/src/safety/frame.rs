@@ -1,14 +1,19 @@
-//! Whether the object's pose and the hand are in one frame, before anything is driven by it.
+//! Whether pose, hand and tactile sensors fit together, before anything is driven by them.
 //!
-//! Neither the object's size nor its shape is known, but where the touching tips are is. They surround the object, so its
+//! The pose and the hand must be in one frame. Neither the object's size nor its shape is known, but where the touching tips are is. They surround the object, so its
 //! origin lies among them: within [`SafetyConfig::pose_spread`] times the radius of the contacts, R, their largest distance
 //! from their mean. A camera that is calibrated badly, a pose in another frame or of another object does not fit, and K
 //! would press with all its might through lever arms that do not exist. So nothing is driven until it does.
+//!
+//! Fingers that hold an object press at each other: on average their normals n point from the contacts c to their middle,
+//! mean n . (c - mean c) < 0, whatever the pose is. A contact lies on its tip, one tip radius along n from the centre, so
+//! normals with swapped axes or the wrong sign make that mean about a tip radius instead. Fingers that carry an object
+//! from below make it zero; half a tip radius is the limit.
 
 use super::config::SafetyConfig;
 use crate::hand::{HandModel, HandState};
 use crate::signals::Tactile;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 
 /// Contacts that show where the object is; all of them on a hand that has fewer fingers.
 const ENOUGH: usize = 3;
@@ -19,24 +24,36 @@ pub struct FrameGuard {
     spread: f64,
     /// The last place at which each tip felt the object, in its frame, m: a finger that is let go stays where it is.
     places: Vec<Option<Vector3<f64>>>,
-    refused: bool,
+    verdict: Verdict,
+}
+
+/// What the touching tips say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Verdict {
+    /// Nothing against it.
+    #[default]
+    Fits,
+    /// The pose's origin is not among the contacts.
+    PoseElsewhere,
+    /// The contacts' normals point away from each other.
+    NormalsOutwards,
 }
 
 impl FrameGuard {
     /// A guard for `n` fingertips.
     pub fn new(n: usize, config: &SafetyConfig) -> Self {
-        Self { spread: config.pose_spread, places: vec![None; n], refused: false }
+        Self { spread: config.pose_spread, places: vec![None; n], verdict: Verdict::Fits }
     }
 
     /// Forgets the past.
     pub fn reset(&mut self) {
         self.places.fill(None);
-        self.refused = false;
+        self.verdict = Verdict::Fits;
     }
 
-    /// True where the pose does not fit the touching tips.
-    pub fn refused(&self) -> bool {
-        self.refused
+    /// What the last step found.
+    pub fn verdict(&self) -> Verdict {
+        self.verdict
     }
 
     /// Judges the pose `X_WO` against the tips that touch, or did; with too few of them the last verdict stands.
@@ -47,19 +64,31 @@ impl FrameGuard {
             }
         }
         let places = &self.places;
+        // Contact and normal, in W, and the tip's radius.
         let contacts = || {
             places.iter().enumerate().filter_map(|(j, place)| {
-                place.map(|p_FC| (state.tip(j) * Point3::from(p_FC.normalize() * hand.tip_radius(j))).coords)
+                let (X_WF, radius) = (state.tip(j), hand.tip_radius(j));
+                place.map(|p_FC| {
+                    let n_W = X_WF.rotation * p_FC.normalize();
+                    (X_WF.translation.vector + n_W * radius, n_W, radius)
+                })
             })
         };
         let count = contacts().count();
         if count < ENOUGH.min(places.len()) {
             return;
         }
-        let mean = contacts().sum::<Vector3<f64>>() / count as f64;
-        let radius = contacts().map(|p_WC| (p_WC - mean).norm()).fold(0.0, f64::max);
+        let mean = contacts().map(|(p_WC, ..)| p_WC).sum::<Vector3<f64>>() / count as f64;
+        let radius = contacts().map(|(p_WC, ..)| (p_WC - mean).norm()).fold(0.0, f64::max);
+        let outwards: f64 = contacts().map(|(p_WC, n_W, _)| n_W.dot(&(p_WC - mean))).sum();
+        let limit: f64 = contacts().map(|(.., radius)| 0.5 * radius).sum();
         // NaN fits nothing.
-        self.refused = !((X_WO.translation.vector - mean).norm() <= self.spread * radius);
+        let among = (X_WO.translation.vector - mean).norm() <= self.spread * radius;
+        self.verdict = match (outwards > limit, among) {
+            (true, _) => Verdict::NormalsOutwards,
+            (false, true) => Verdict::Fits,
+            (false, false) => Verdict::PoseElsewhere,
+        };
     }
 }
 
@@ -100,10 +129,37 @@ mod tests {
             let mut guard = FrameGuard::new(n, &SafetyConfig::default());
             let mut refuses = |x: f64, y: f64, z: f64| {
                 guard.admit(&hand, &state, &tactile, &Isometry3::translation(x, y, z));
-                guard.refused()
+                guard.verdict() == Verdict::PoseElsewhere
             };
-            assert!(!refuses(0.0, 0.0, 0.0) && !refuses(1.2 * radius, 0.0, 0.0) && !refuses(0.0, 0.0, 1.8 * radius));
-            assert!(refuses(2.4 * radius, 0.0, 0.0) && refuses(0.0, -0.3, 0.4) && refuses(f64::NAN, 0.0, 0.0));
+            assert!(
+                !refuses(0.0, 0.0, 0.0)
+                    && !refuses(1.2 * radius, 0.0, 0.0)
+                    && !refuses(0.0, 0.0, 1.8 * radius)
+            );
+            assert!(
+                refuses(2.4 * radius, 0.0, 0.0) && refuses(0.0, -0.3, 0.4) && refuses(f64::NAN, 0.0, 0.0)
+            );
+        }
+    }
+
+    #[test]
+    fn normals_that_do_not_face_each_other_are_the_sensors_fault_whatever_the_pose() {
+        let turns: [fn(f64) -> Vector3<f64>; 4] = [
+            |r| Vector3::new(0.0, -r, 0.0),
+            |r| Vector3::new(0.0, 0.0, -r),
+            |r| Vector3::new(0.0, 0.0, r),
+            |r| Vector3::new(r, 0.0, 0.0),
+        ];
+        for (n, radius) in [(3, 0.03), (4, 0.025), (5, 0.002)] {
+            let (hand, state, mut tactile) = ring(n, radius);
+            let mut guard = FrameGuard::new(n, &SafetyConfig::default());
+            for turn in turns {
+                tactile.iter_mut().for_each(|reading| reading.p_FC = turn(0.01));
+                for x in [0.0, 0.3] {
+                    guard.admit(&hand, &state, &tactile, &Isometry3::translation(x, 0.0, 0.0));
+                    assert_eq!(guard.verdict(), Verdict::NormalsOutwards);
+                }
+            }
         }
     }
 
@@ -115,17 +171,20 @@ mod tests {
         tactile[3].f_n = 0.0;
         let far = Isometry3::translation(0.2, 0.0, 0.0);
         guard.admit(&hand, &state, &tactile, &far);
-        assert!(!guard.refused(), "two of four");
+        assert!(guard.verdict() == Verdict::Fits, "two of four");
         tactile[2].f_n = 0.1;
         guard.admit(&hand, &state, &tactile, &far);
-        assert!(guard.refused());
+        assert!(guard.verdict() == Verdict::PoseElsewhere);
         tactile.iter_mut().for_each(|reading| reading.f_n = 0.0);
         guard.admit(&hand, &state, &tactile, &far);
-        assert!(guard.refused(), "a hand that has let go still knows where it touched");
+        assert!(
+            guard.verdict() == Verdict::PoseElsewhere,
+            "a hand that has let go still knows where it touched"
+        );
         guard.admit(&hand, &state, &tactile, &Isometry3::translation(0.01, 0.0, 0.0));
-        assert!(!guard.refused());
+        assert!(guard.verdict() == Verdict::Fits);
         guard.reset();
         guard.admit(&hand, &state, &tactile, &far);
-        assert!(!guard.refused());
+        assert!(guard.verdict() == Verdict::Fits);
     }
 }

@@ -4,7 +4,7 @@ use super::clock::{Clock, Tick};
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
 use super::effort::{EffortGuard, Efforts};
-use super::frame::FrameGuard;
+use super::frame::{FrameGuard, Verdict};
 use super::joints::{self, JointGuard};
 use super::motors::MotorGuard;
 use super::odometry::Odometry;
@@ -354,8 +354,10 @@ impl Guard {
         self.odometry.settle(self.pose.sensed(), self.pose.from_sensor());
         if !plan.grasped {
             self.frame.admit(hand, state, &self.trusted.tactile, self.pose.sensed());
-            if self.frame.refused() {
-                self.faults.insert(Fault::PoseFrame);
+            let verdict = self.frame.verdict();
+            self.faults.insert_if(verdict == Verdict::PoseElsewhere, Fault::PoseFrame);
+            self.faults.insert_if(verdict == Verdict::NormalsOutwards, Fault::TactileAxes);
+            if verdict != Verdict::Fits {
                 // The next pose is the first one again: there is nothing that it could have jumped from.
                 self.pose.reset();
                 self.odometry.reset();
@@ -403,7 +405,7 @@ impl Guard {
         if self.damped.contains(&true) {
             mode = SafeMode::Damp;
         }
-        if gone || self.frame.refused() || !(self.joints.known() && self.pose.known()) {
+        if gone || self.frame.verdict() != Verdict::Fits || !(self.joints.known() && self.pose.known()) {
             mode = SafeMode::Stop;
         }
         self.allows_gaits = !slow && mode <= SafeMode::Hold;

@@ -163,7 +163,8 @@ impl JointGuard {
 
     /// Whether more than half of the hand's encoders have read the same numbers for long: then the fingers' motion says nothing.
     fn stands_still(&self) -> bool {
-        2 * self.joints.iter().filter(|joint| joint.still > self.config.stuck_time).count() > self.joints.len()
+        2 * self.joints.iter().filter(|joint| joint.still > self.config.stuck_time).count()
+            > self.joints.len()
     }
 
     /// Whether nobody has read the encoders: at least half of the hand's angles, and two of them, are zero to the last bit.

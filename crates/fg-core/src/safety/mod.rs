@@ -12,7 +12,7 @@
 //! | [`effort`] | all tactile sensors together, by the joint torques |
 //! | [`motors`] | motors, by the torques that they give |
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
-//! | [`frame`] | the first pose, against the touching tips |
+//! | [`frame`] | the first pose and the first normals, against the touching tips |
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
 //! | [`relearn`] | joint angles that are refused: whether they are right after all |
@@ -83,11 +83,13 @@ pub enum Fault {
     PoseFrame = 19,
     /// Most tactile sensors feel something else than the joint torques press with.
     TactileScale = 20,
+    /// The normals of the first contacts point away from each other: axes are swapped, or a sign is wrong.
+    TactileAxes = 21,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -109,6 +111,7 @@ impl Fault {
         Self::Overdue,
         Self::PoseFrame,
         Self::TactileScale,
+        Self::TactileAxes,
     ];
 
     /// The name used in logs.
@@ -135,6 +138,7 @@ impl Fault {
             Self::Overdue => "overdue",
             Self::PoseFrame => "pose_frame",
             Self::TactileScale => "tactile_scale",
+            Self::TactileAxes => "tactile_axes",
         }
     }
 }
