@@ -10,7 +10,6 @@ from fingergait._core import Diagnostics
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors, yaw_reached
 from fingergait.scenario import Scenario
-from fingergait.scenario.reference import Trajectory
 
 POSITION_REACHED = 0.010  # m
 ANGLE_REACHED = 0.1  # rad
@@ -60,7 +59,10 @@ _CAUSES = {
     "pose_stale": _Cause("the object's pose stands still while it moves", "check the pose sensor's connection"),
     "reference": _Cause("the reference is no pose, or out of reach", "check the reference"),
     "motor": _Cause("a joint is asked for a torque and gives none", "check the motors' power and torque sensors"),
-    "contacts_lost": _Cause("no finger felt the object any more", "check how it is held: grasp, friction, mass"),
+    "contacts_lost": _Cause(
+        "no finger felt the object any more",
+        "check the tactile sensors' axes and connection, and grasp, friction and mass",
+    ),
     "finger_lost": _Cause("a finger looked for the object and did not find it", "check the tip's reach and sensor"),
     "torque_box": _Cause(
         "joints need more torque for their own weight and motion than they have", "check the torque limits"
@@ -75,14 +77,14 @@ def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
     """The figures of `run --json` that say whether the task was done.
 
     `completed`: not dropped, and at the end the object is within 10 mm and 0.1 rad of the reference, and has turned by
-    what was asked to 0.1 rad. `asked_rotation_rad`: integral of the reference's rate up to the end; `turned_rad`: the
-    object's net turn about the reference's axis. `worst_safe_mode`, `safe_mode_fraction`, `faults`: names, and share of
+    what was asked to 0.1 rad. `asked_rotation_rad`: net turn of the reference up to the end, the
+    integral of its rate with its step; `turned_rad`: that of the object, about the same axis. `worst_safe_mode`, `safe_mode_fraction`, `faults`: names, and share of
     the control steps after t = 0. `goals_reached`: None, as the reference has no goals. `link_contacts`: control steps
     in which a part of a finger other than its tip touched the object. `incomplete_reason`: words, None where completed.
     """
     t = log.t
     errors = pose_errors(log.pose("object")[-1:], log.pose("desired")[-1:])[0]
-    asked = Trajectory(scenario.reference, log.pose("desired")[0]).yaw(float(t[-1]))[0]
+    asked = float(yaw_reached(log.pose("desired"))[-1])
     turned = float(yaw_reached(log.pose("object"))[-1])
     position, angle = float(np.linalg.norm(errors[:3])), float(np.linalg.norm(errors[3:]))
     # Errors of orientation are those of less than half a turn; the turn itself counts whole ones.

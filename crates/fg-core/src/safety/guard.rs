@@ -352,7 +352,7 @@ impl Guard {
         let X_WO = self.pose.admit(X_WO, motion.as_ref(), &centre, elapsed, &mut self.faults);
         self.trusted.X_WO = X_WO;
         self.odometry.settle(self.pose.sensed(), self.pose.from_sensor());
-        if !plan.grasped {
+        if !plan.grasped && self.joints.known() {
             self.frame.admit(hand, state, &self.trusted.tactile, self.pose.sensed());
             let verdict = self.frame.verdict();
             self.faults.insert_if(verdict == Verdict::PoseElsewhere, Fault::PoseFrame);
