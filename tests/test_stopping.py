@@ -29,7 +29,7 @@ def stopped(
         start_new_session=True,
         cwd=cwd,
     )
-    until = time.monotonic() + 90.0
+    until = time.monotonic() + 120.0
     while not ready() and time.monotonic() < until and process.poll() is None:
         time.sleep(0.02)
     assert process.poll() is None, process.communicate()
@@ -41,15 +41,28 @@ def stopped(
     return process.returncode, out, err
 
 
-def after(seconds: float) -> Callable[[], bool]:
-    begin = time.monotonic()
-    return lambda: time.monotonic() - begin > seconds
+def then(ready: Callable[[], bool], seconds: float) -> Callable[[], bool]:
+    """Whether it has been `ready` for some time."""
+    begin: list[float] = []
+
+    def waited() -> bool:
+        if not begin and ready():
+            begin.append(time.monotonic())
+        return bool(begin) and time.monotonic() - begin[0] > seconds
+
+    return waited
+
+
+def children_of(count: int) -> Callable[[], bool]:
+    """Whether this process's child has that many processes of its own."""
+    return lambda: any(len(child.children()) >= count for child in psutil.Process().children())
 
 
 @pytest.mark.parametrize(("signum", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_run_keeps_what_was_measured(signum: int, status: int, tmp_path: Path) -> None:
+    tmp_path /= "out"
     arguments = ["run", "lift-and-rotate", "--duration", "3000", "--json", "--out", str(tmp_path)]
-    found, out, err = stopped(arguments, after(4.0), signum)
+    found, out, err = stopped(arguments, then(tmp_path.is_dir, 1.0), signum)
     assert (
         found == status and err.count("\n") == 1 and err.startswith("fingergait: stopped: at ") and str(tmp_path) in err
     )
@@ -82,13 +95,15 @@ def test_a_campaign_keeps_its_rows_and_says_how_to_go_on(tmp_path: Path) -> None
 
 
 def test_a_suite_counts_the_seeds_that_are_done() -> None:
-    status, out, err = stopped(["suite", "--seeds", "40", "--workers", "2", "--set", "duration=3"], after(12.0))
+    status, out, err = stopped(
+        ["suite", "--seeds", "40", "--workers", "2", "--set", "duration=3"], then(children_of(2), 6.0)
+    )
     assert status == 130 and err.count("\n") == 1 and "of 40 seeds are done" in err
     assert "held the limits" in out
 
 
 def test_reproduce_keeps_the_figures_of_the_runs_that_are_done(tmp_path: Path) -> None:
-    status, out, err = stopped(["reproduce", "--quick", "--out", str(tmp_path)], after(8.0))
+    status, out, err = stopped(["reproduce", "--quick", "--out", str(tmp_path)], then(children_of(2), 2.0))
     assert status == 130 and out == "" and "Traceback" not in err
     last = err.strip().splitlines()[-1]
     assert last.startswith("fingergait: stopped: ")
@@ -97,9 +112,10 @@ def test_reproduce_keeps_the_figures_of_the_runs_that_are_done(tmp_path: Path) -
 
 
 def test_a_synthesis_writes_nothing(tmp_path: Path) -> None:
-    status, _, err = stopped(["synthesize", "--out", str(tmp_path / "K.json")], after(5.0))
+    out = tmp_path / "out"
+    status, _, err = stopped(["synthesize", "--out", str(out / "K.json")], then(out.is_dir, 1.0))
     assert status == 130 and err == "fingergait: stopped: nothing was written\n"
-    assert list(tmp_path.iterdir()) == []
+    assert list(out.iterdir()) == []
 
 
 def test_a_scheduler_that_is_not_there_costs_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
