@@ -151,3 +151,11 @@ def test_turning_goes_on_while_a_fifth_of_the_reads_fails() -> None:
     found = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 8.0, "fault": [fault]})).metrics
     assert found["completed"] and found["faults"] == ["encoder"] and found["gaits"] >= 3
     assert found["max_position_error_m"] < 1e-3
+
+
+def test_encoders_that_all_stand_still_are_named() -> None:
+    """Only the first joint of each finger is read: the others say what they said at the start."""
+    faults = [{"kind": "encoder_stuck", "finger": j, "joint": i, "at": -1.0} for j in range(4) for i in (1, 2)]
+    found = fg.simulate(Scenario.load("lift-and-rotate", {"duration": 2.5, "fault": faults})).metrics
+    assert not found["completed"] and not found["dropped"]
+    assert "encoder_stuck" in found["faults"] and "encoders stand still" in found["incomplete_reason"]
