@@ -94,10 +94,11 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         solver[diagnostics.solver] += 1
         if k % _CHECK_EVERY == 0:
             standing = diagnostics.safe_mode != "normal"
-            if monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
-                lost = reason(log, scene, monitor.symptom)
+            refused = not _REFUSED.isdisjoint(diagnostics.faults)
+            if refused and plant.t >= _REFUSED_S:
                 break
-            if plant.t >= _REFUSED_S and not _REFUSED.isdisjoint(diagnostics.faults):
+            if not refused and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
+                lost = reason(log, scene, monitor.symptom)
                 break
         if watch is not None and k % watch_every == 0 and watch(plant, log):
             break

@@ -76,7 +76,7 @@ _CAUSES = {
 def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
     """The figures of `run --json` that say whether the task was done.
 
-    `completed`: not dropped, and at the end the object is within 10 mm and 0.1 rad of the reference, and has turned by
+    `completed`: not dropped or let go, and at the end the object is within 10 mm and 0.1 rad of the reference, and has turned by
     what was asked to 0.1 rad. `asked_rotation_rad`: net turn of the reference up to the end, the integral of its rate
     with its step. `turned_rad`: that of the object, about the same axis. `worst_safe_mode`, `safe_mode_fraction`,
     `faults`: names, and share of the control steps after t = 0. `goals_reached`: None, as the reference has no goals.
@@ -92,7 +92,8 @@ def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
     reached = position <= POSITION_REACHED and angle <= ANGLE_REACHED and abs(turned - asked) <= ANGLE_REACHED
     modes = log["safe_mode"][t >= 0.0] if t[-1] >= 0.0 else log["safe_mode"]
     seen = np.bitwise_or.reduce(log["faults"].astype(np.int64))
-    completed = reached and not dropped
+    # Whoever holds nothing has not done anything, wherever the object happens to be.
+    completed = reached and not dropped and MODES[int(log["safe_mode"][-1])] != "stop"
     return {
         "completed": completed,
         "incomplete_reason": None if completed else explain(log, scenario, position, asked, turned, angle),
@@ -115,7 +116,7 @@ def explain(log: Log, scenario: Scenario, position: float, asked: float, turned:
         missing.append(f"{angle:.2f} rad off the reference at the end")
     if position > POSITION_REACHED:
         missing.append(f"{1e3 * position:.0f} mm off the reference at the end")
-    return "; ".join([", ".join(missing) or "the object was lost", standing(log, scenario)])
+    return "; ".join([*([", ".join(missing)] if missing else []), standing(log, scenario)])
 
 
 def standing(log: Log, scenario: Scenario) -> str:
