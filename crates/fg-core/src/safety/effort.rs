@@ -4,6 +4,7 @@
 //! fulfils J J^T f = J (tau - tau_own), and its part along the normal is what the tactile sensor should feel. A sensor that
 //! gives another unit, or swapped axes, tells something else, and so do all of its kind. One finger alone may be pushed, or
 //! have a weak sensor, which other checks see; most of them together are wired or scaled wrongly.
+//! That does not change on the way: once they have agreed under load for a while, nothing is compared any more.
 
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
@@ -14,6 +15,10 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 const FILTER: f64 = 0.1;
 /// A contradiction must last for so long, s, which an impact or a push does not.
 const LASTS: f64 = 0.3;
+/// Both must agree for so long, s, under so many times the margin ...
+const AGREED: f64 = 0.3;
+/// ... which is enough to tell a tenth of a force from all of it.
+const LOADED: f64 = 4.0;
 /// Added to J J^T, m^2: a finger near a singularity tells little about the force.
 const LEVEL: f64 = 1e-7;
 
@@ -30,6 +35,8 @@ pub struct EffortGuard {
     /// Fingers in which both have been compared for a while.
     seen: Vec<f64>,
     wrong: Debounce,
+    /// For how long both have agreed under load, s.
+    agreed: f64,
     clear: f64,
 }
 
@@ -56,6 +63,7 @@ impl EffortGuard {
             told: vec![0.0; n],
             seen: vec![0.0; n],
             wrong: Debounce::default(),
+            agreed: 0.0,
             clear: config.recovery_time,
         }
     }
@@ -66,6 +74,7 @@ impl EffortGuard {
         self.told.fill(0.0);
         self.seen.fill(0.0);
         self.wrong.reset();
+        self.agreed = 0.0;
     }
 
     /// True where most of the fingers feel something else than they press with, for long.
@@ -82,7 +91,10 @@ impl EffortGuard {
         first: impl Fn(usize) -> usize,
         holds: impl Fn(usize) -> bool,
     ) {
-        let (mut compared, mut odd) = (0, 0);
+        if self.agreed > AGREED {
+            return;
+        }
+        let (mut compared, mut odd, mut loaded) = (0, 0, 0);
         for (j, reading) in tactile.iter().enumerate() {
             let at = first(j)..first(j + 1);
             // Torque sensors that a hand does not have read zero.
@@ -99,10 +111,19 @@ impl EffortGuard {
             self.told[j] += (told - self.told[j]) * share;
             compared += 1;
             let (felt, told) = (self.felt[j], self.told[j]);
+            loaded += usize::from(told > LOADED * self.margin);
             odd += usize::from((felt - told).abs() > self.margin + self.ratio * felt.max(told));
         }
         let wrong = compared >= 2 && 2 * odd > compared;
+        if wrong {
+            self.agreed = 0.0;
+        } else if compared >= 2 && 2 * loaded > compared {
+            self.agreed += self.dt;
+        }
         self.wrong.update(wrong, self.dt, LASTS, self.clear);
+        if self.agreed > AGREED {
+            self.wrong.reset();
+        }
     }
 }
 
