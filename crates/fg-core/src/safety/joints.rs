@@ -121,7 +121,7 @@ impl JointGuard {
         trusted: &mut [f64],
         faults: &mut Faults,
     ) {
-        if self.unread(q) {
+        if is_unread(q) {
             self.skip(q, elapsed, faults);
             return;
         }
@@ -165,14 +165,6 @@ impl JointGuard {
     fn stands_still(&self) -> bool {
         2 * self.joints.iter().filter(|joint| joint.still > self.config.stuck_time).count()
             > self.joints.len()
-    }
-
-    /// Whether nobody has read the encoders: at least half of the hand's angles, and two of them, are zero to the last bit.
-    ///
-    /// So is a buffer that was never filled. A joint that happens to stand at zero behind a coarse encoder is one of few.
-    fn unread(&self, q: &[f64]) -> bool {
-        let zeros = q.iter().filter(|q| **q == 0.0).count();
-        zeros >= 2 && 2 * zeros >= q.len()
     }
 
     /// Takes a sample that was not read: the last good angles go on, and the fingers are trusted for a short while.
@@ -219,6 +211,14 @@ impl JointGuard {
         }
         stuck
     }
+}
+
+/// Whether nobody has read the encoders: at least half of the hand's angles, and two of them, are zero to the last bit.
+///
+/// So is a buffer that was never filled. A joint that happens to stand at zero behind a coarse encoder is one of few.
+fn is_unread(q: &[f64]) -> bool {
+    let zeros = q.iter().filter(|q| **q == 0.0).count();
+    zeros >= 2 && 2 * zeros >= q.len()
 }
 
 impl Joint {
