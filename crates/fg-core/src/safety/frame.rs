@@ -150,14 +150,18 @@ mod tests {
             let (hand, state, mut tactile) = ring(n, radius);
             let mut guard = FrameGuard::new(n, &SafetyConfig::default());
             for turn in turns {
-                tactile.iter_mut().for_each(|reading| reading.p_FC = turn(0.01));
+                for reading in &mut tactile {
+                    reading.p_FC = turn(0.01);
+                }
                 for x in [0.0, 0.3] {
                     guard.admit(&hand, &state, &tactile, &Isometry3::translation(x, 0.0, 0.0));
                     assert_eq!(guard.verdict(), Verdict::NormalsOutwards);
                 }
             }
             // Fingers that carry the object from below.
-            tactile.iter_mut().for_each(|reading| reading.p_FC = Vector3::new(0.0, 0.0, 0.01));
+            for reading in &mut tactile {
+                reading.p_FC = Vector3::new(0.0, 0.0, 0.01);
+            }
             guard.admit(&hand, &state, &tactile, &Isometry3::translation(0.0, 0.0, 0.01));
             assert_ne!(guard.verdict(), Verdict::NormalsOutwards);
         }
@@ -175,7 +179,9 @@ mod tests {
         tactile[2].f_n = 0.1;
         guard.admit(&hand, &state, &tactile, &far);
         assert!(guard.verdict() == Verdict::PoseElsewhere);
-        tactile.iter_mut().for_each(|reading| reading.f_n = 0.0);
+        for reading in &mut tactile {
+            reading.f_n = 0.0;
+        }
         guard.admit(&hand, &state, &tactile, &far);
         assert!(
             guard.verdict() == Verdict::PoseElsewhere,
