@@ -329,7 +329,9 @@ fn forces_in_another_unit_contradict_the_joint_torques() {
     let mut replay = Replay::new(|config| config.safety.motor_asked = 1.0);
     replay.run(0..400, |_, m, _| {
         m.tau.fill(0.0);
-        m.tactile.iter_mut().for_each(|reading| reading.f_n *= 3.0);
+        for reading in &mut m.tactile {
+            reading.f_n *= 3.0;
+        }
     });
     assert!(!replay.has(Fault::TactileScale));
 }
