@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 _FOV = np.deg2rad(35.0)
 _AZIMUTH, _ELEVATION = np.deg2rad(-60.0), np.deg2rad(28.0)
-_OPACITY = 0.6  # of the object: the forces on it are inside
+_OPACITY = 0.5  # of the object: the forces on it are inside
 _GAMMA = 2.2  # MuJoCo's colours are meant for the screen, the page's meshes want them linear
 _AMBIENT = 0.4  # share of the light that comes from all around
 
@@ -49,7 +49,7 @@ class Drawing:
         )
         self._object = scene.object_body
         self.centre, self.size = _frame(scene, start)
-        distance = 1.2 * self.size / np.sin(0.5 * _FOV)
+        distance = 1.05 * self.size / np.sin(0.5 * _FOV)
         direction = np.array(
             [np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)]
         )

@@ -121,10 +121,12 @@ class Inputs:
         How many the hand has.
     bounds
         Smallest and largest offset (6,) of the desired pose, m and rad.
+    period
+        Of the control step, s.
     """
 
-    def __init__(self, fingers: int, bounds: tuple[Array, Array]) -> None:
-        self._fingers, self.bounds = fingers, bounds
+    def __init__(self, fingers: int, bounds: tuple[Array, Array], period: float) -> None:
+        self._fingers, self.bounds, self._period = fingers, bounds, period
         self._lock = threading.Lock()
         self.clear()
 
@@ -190,15 +192,16 @@ class Inputs:
                 if t - self._changed.get(key, -math.inf) >= _EVERY:
                     self._changed[key] = t
                     events.append(Input(at=t, key=key, value=self._wanted.pop(key)))
+            begin = t + self._period  # of a fault: the measurement of t has been taken
             for kind, what in self._actions:
                 if kind == "push":
                     events.append(Disturbance(at=t, duration=_PUSH, force=what))
                 elif kind == "power":
-                    events.append(FingerPowerLoss(at=t, finger=what[0], duration=what[1]))
+                    events.append(FingerPowerLoss(at=begin, finger=what[0], duration=what[1]))
                 elif kind == "tactile":
-                    events.append(TactileLost(at=t, finger=what[0], duration=what[1]))
+                    events.append(TactileLost(at=begin, finger=what[0], duration=what[1]))
                 else:
-                    events.append(PoseStale(at=t, duration=what[1]))
+                    events.append(PoseStale(at=begin, duration=what[1]))
             self._actions.clear()
             self.record.extend(events[: max(0, _RECORDED - len(self.record))])
         return events

@@ -4,7 +4,7 @@ import threading
 import time
 
 _AHEAD = 0.008  # s that the simulation may be ahead of the clock: it sleeps a few times a frame and not each step
-_BEHIND = 0.1  # s behind which it stops running after the clock
+_BEHIND = 0.5  # s behind which it stops running after the clock
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -82,6 +82,13 @@ class Pacer:
         with self._changed:
             self._speed = min(max(speed, SPEEDS[0]), SPEEDS[-1])
             self._anchor = self._mark = None
+            self._changed.notify_all()
+
+    def restart(self) -> None:
+        """Takes the simulated time of the next `wait` as the present: it has jumped."""
+        with self._changed:
+            self._anchor = self._mark = None
+            self._woken = True
             self._changed.notify_all()
 
     def wake(self) -> None:

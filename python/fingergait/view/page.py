@@ -75,7 +75,7 @@ class Page:
         self.drawing = Drawing(server, scene, start)
         panel = gui.add_panel()
         with panel.add_tab("Plots", viser.Icon.CHART_LINE):
-            self._plots = Plots(server, history, self._pose)
+            self.plots = Plots(server, history, self._pose)
         with panel.add_tab("Overlays", viser.Icon.STACK_2):
             self.overlays = Overlays(server, self._pose, scenario)
         panel.dock_left()
@@ -137,7 +137,7 @@ class Page:
         if count % _OVERLAYS == 0:
             self.overlays.update(pose)
         if count % _PLOTS == 1:
-            self._plots.update()
+            self.plots.update()
         if count % _WORDS == 2:
             self._say(pose)
 

@@ -37,7 +37,7 @@ class Plots:
         self._history, self._pose = history, pose
         names = history.names.fingers
         fingers = [f"{name} " for name in names]
-        self._charts = [
+        self.charts = [
             _chart(server, "pose error, mm and 10 mrad", ["mm", "10 mrad"]),
             _chart(server, "quality Q, 1e-3", ["Q", "threshold"], limits=1),
             _chart(server, "normal forces, N", fingers),
@@ -66,7 +66,7 @@ class Plots:
             [*shares, np.ones(len(t))],
             [take("safe_mode")[:, 0]],
         ]
-        for chart, columns in zip(self._charts, series, strict=True):
+        for chart, columns in zip(self.charts, series, strict=True):
             chart.data = (t, *(np.nan_to_num(column) for column in columns))
 
 

@@ -34,12 +34,14 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
-def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000) -> Any:
-    """The page at `address`, drawn."""
-    page = chromium.new_page(viewport={"width": width, "height": height})
+def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000, scale: float = 1.0) -> Any:
+    """The page at `address`, drawn, in a window of so many pixels; `scale`: of its resolution."""
+    page = chromium.new_page(viewport={"width": width, "height": height}, device_scale_factor=scale)
     page.goto(address)
     page.wait_for_selector("canvas")
-    page.get_by_text("All hold").or_(page.get_by_text("fingers have")).or_(page.get_by_text("to spare")).first.wait_for()
+    page.get_by_text("All hold").or_(page.get_by_text("fingers have")).or_(
+        page.get_by_text("to spare")
+    ).first.wait_for()
     return page
 
 

@@ -51,7 +51,7 @@ class Session:
         self.scene = self._stepper.plant.scene
         self.start_qpos = self._stepper.plant.start.qpos
         bounds = reach(self.scene, self.start_qpos, scenario.reference.lift)
-        self.inputs = Inputs(len(self._stepper.fingers), bounds)
+        self.inputs = Inputs(len(self._stepper.fingers), bounds, scenario.period)
         self.pacer = Pacer()
         names = Names(self._stepper.columns, self._stepper.fingers)
         self.history = Ring(names, round(_KEPT * scenario.controller.rate_hz))
@@ -84,41 +84,8 @@ class Session:
         self._reset = True
         self.pacer.wake()
 
-    @property
-    def offset(self) -> NDArray[np.float64]:
-        """How far the desired pose is from the scenario's own now, (6,), m and rad."""
-        return self._stepper.offset
-
-    def saved(self) -> dict[str, Any]:
-        """The run so far with all its inputs, as the TOML values of a scenario that repeats it."""
-        row = self.history.row()
-        period = self.scenario.period
-        return self.inputs.saved(self.scenario, max(period, (row.t if row is not None else 0.0) + period))
-
-    def _run(self) -> None:
-        try:
-            while not self._stop:
-                if self._reset:
-                    self._restart()
-                if self.pacer.wait(self._stepper.t):
-                    self._step()
-        except Exception as error:  # shown on the page and by the command
-            self.failure = error
-        finally:
-            self._stepper.plant.close()
-            self._ended.set()
-
-    def _restart(self) -> None:
-        self._reset = False
-        self._stepper.plant.close()
-        self._stepper = Stepper(self.scenario, steered=True)
-        self._monitor = LossMonitor(self.scenario)
-        self.lost = None
-        self.runs += 1
-        self.inputs.clear()
-        self.history.clear()
-
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One control step; for the simulation's thread, and for who drives a session without one."""
         stepper, t = self._stepper, self._stepper.t
         for event in self.inputs.take(t):
             stepper.apply(event)
@@ -136,3 +103,37 @@ class Session:
         stepper.advance()
         if self.steps % 50 == 0:
             self.cpu_s = time.thread_time()
+
+    @property
+    def offset(self) -> NDArray[np.float64]:
+        """How far the desired pose is from the scenario's own now, (6,), m and rad."""
+        return self._stepper.offset
+
+    def saved(self) -> dict[str, Any]:
+        """The run so far with all its inputs, as the TOML values of a scenario that repeats it."""
+        row = self.history.row()
+        period = self.scenario.period
+        return self.inputs.saved(self.scenario, max(period, (row.t if row is not None else 0.0) + period))
+
+    def _run(self) -> None:
+        try:
+            while not self._stop:
+                if self._reset:
+                    self._restart()
+                if self.pacer.wait(self._stepper.t):
+                    self.step()
+        except Exception as error:  # shown on the page and by the command
+            self.failure = error
+        finally:
+            self._stepper.plant.close()
+            self._ended.set()
+
+    def _restart(self) -> None:
+        self._reset = False
+        self._stepper.plant.close()
+        self._stepper = Stepper(self.scenario, steered=True)
+        self._monitor = LossMonitor(self.scenario)
+        self.lost = None
+        self.runs += 1
+        self.inputs.clear()
+        self.history.clear()
