@@ -6,7 +6,20 @@ use fg_core::hand::{HandModel as Core, HandState};
 use numpy::{AllowTypeChange, PyArray2, PyArrayLike1, PyArrayLike2};
 use pyo3::prelude::*;
 
-/// Kinematics of a hand, from the JSON that `fingergait.hand` derives from an MJCF.
+/// Kinematics and weight of a hand, from its JSON text.
+///
+/// Any number of fingers with the same number of joints each, fixed in W. The text's format is in ARCHITECTURE.md
+/// ("Hand model"); `fingergait.hand_json` makes it from an MJCF.
+///
+/// Parameters
+/// ----------
+/// spec
+///     JSON text; lengths in m, masses in kg, angles in rad, quaternions wxyz.
+///
+/// Raises
+/// ------
+/// ConfigError
+///     A field that is missing, unknown, not finite or out of range; names it.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct HandModel(pub Core);
 
@@ -26,18 +39,24 @@ impl HandModel {
         Core::from_json(spec).map(Self).map_err(to_py)
     }
 
+    /// Number of fingers.
     #[getter]
     fn n_fingers(&self) -> usize {
         self.0.n_fingers()
     }
 
-    /// Joints of one finger.
+    /// Number of joints of one finger.
     #[getter]
     fn n_joints(&self) -> usize {
         self.0.n_joints()
     }
 
-    /// Centres of the fingertips in W, (n_fingers, 3), at joint angles q (n_fingers, n_joints).
+    /// Centres of the fingertips in W, (n_fingers, 3), m, at joint angles q (n_fingers, n_joints), rad.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If q has another shape.
     fn tip_positions<'py>(
         &self,
         py: Python<'py>,
@@ -48,7 +67,23 @@ impl HandModel {
         Ok(array2(py, (n, 3), |j, r| state.tip(j).translation.vector[r]))
     }
 
-    /// Velocity Jacobian (3, n_joints) in W of the point of the last link now at `point` (3,) in W.
+    /// Velocity Jacobian in W of a point of a finger's last link, (3, n_joints), m/rad: v = J qd.
+    ///
+    /// Parameters
+    /// ----------
+    /// q
+    ///     Joint angles (n_fingers, n_joints), rad.
+    /// finger
+    ///     Index of the finger.
+    /// point
+    ///     Where the point is now, (3,) in W, m.
+    ///
+    /// Raises
+    /// ------
+    /// ConfigError
+    ///     If there is no such finger.
+    /// ShapeError
+    ///     If q or point has another shape.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -65,7 +100,12 @@ impl HandModel {
         Ok(array2(py, (3, self.0.n_joints()), |r, c| J[(r, c)]))
     }
 
-    /// Torques (n_fingers, n_joints) that hold the fingers' own weight.
+    /// Torques, N m, that hold the fingers' own weight at joint angles q, rad; both (n_fingers, n_joints).
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If q has another shape.
     fn gravity_torque<'py>(
         &self,
         py: Python<'py>,

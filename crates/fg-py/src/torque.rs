@@ -7,7 +7,21 @@ use fg_core::torque::TorquePid as Core;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn};
 use pyo3::prelude::*;
 
-/// Joint torque tracking at the faster torque rate.
+/// Joint torque tracking at the faster torque rate, Section II: PI with feedforward, rate limit and anti-windup.
+///
+/// Parameters
+/// ----------
+/// n_joints_total
+///     Joints of the whole hand.
+/// dt
+///     Period of the torque loop, s.
+/// config
+///     JSON text of a `Config`, of which `torque` and `force` count; absent: the defaults.
+///
+/// Raises
+/// ------
+/// ConfigError
+///     A field that is unknown or out of range.
 #[pyclass(module = "fingergait._core")]
 pub struct TorquePid {
     core: Core,
@@ -24,7 +38,12 @@ impl TorquePid {
         Ok(Self { core, motor: vec![0.0; n_joints_total] })
     }
 
-    /// Motor torques that drive the measured torques `tau` to `tau_des`; same shape as `tau_des`.
+    /// Motor torques, N m, that drive the measured torques `tau` to `tau_des`; all three of the same shape.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If an array has another number of joints.
     fn step<'py>(
         &mut self,
         py: Python<'py>,

@@ -47,7 +47,20 @@ def compile_spec(spec: mujoco.MjSpec, source: str) -> mujoco.MjModel:
 
 
 def hand_json(path: Path) -> str:
-    """JSON text for `_core.HandModel` of the hand in the MJCF file `path`."""
+    """JSON text for `HandModel` of the hand in an MJCF: lengths in m, masses in kg, angles in rad, quaternions wxyz.
+
+    The world frame W is the file's. The format is in ARCHITECTURE.md ("Hand model").
+
+    Parameters
+    ----------
+    path
+        The MJCF file.
+
+    Raises
+    ------
+    ConfigError
+        A file that MuJoCo cannot read, or a hand that `find_fingers` refuses; names the part.
+    """
     model = compile_spec(load_spec(path), path.name)
     return json.dumps(hand_spec(model, path.name))
 
