@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").rglob("*.md")) + [ROOT / "README.md"]
 _FENCE = re.compile(
-    r"(?:^<!-- (?P<note>not run: .+|exit status \d) -->\n)?^```(?P<kind>\w*)(?P<rest>[^\n]*)\n(?P<text>.*?)^```$",
+    r"(?:^<!-- (?P<note>not run: [^\n]+|exit status \d) -->\n)?^```(?P<kind>\w*)(?P<rest>[^\n]*)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
 
