@@ -113,7 +113,7 @@ class Judge:
                     self.order.remove(away)  # who could not be spared once often can't
                     self.order.insert(0, away)
             if over > DELIVERED and over >= enough:
-                break
+                return over, failing
         return over, failing
 
     def judge(

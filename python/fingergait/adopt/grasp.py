@@ -35,7 +35,7 @@ class Grasp:
     spared
         The same with each finger away; infinite where the others can't hold at any torque.
     slack
-        What the force QP leaves undelivered with each finger away, in fifths of the weight.
+        What the force QP leaves undelivered at the full torque limits with each finger away, in fifths of the weight.
     joint_margin
         Least distance of a joint from its limits at the grasp, as a share of its range.
     link_clearance, finger_gap, palm_clearance

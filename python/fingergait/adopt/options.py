@@ -1,6 +1,6 @@
 """What is asked of a grasp, and how long it is searched for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class SearchOptions:
     """
 
     friction: float = 0.65
-    disturbance: float = 1.0
+    disturbance: float = 0.5
     load_limit: float = 0.7
     reserve: float = np.deg2rad(15.0)
     stroke_cap: float = np.deg2rad(60.0)
@@ -72,6 +72,10 @@ class SearchOptions:
 
     def quick(self) -> "SearchOptions":
         """The same demands with less effort: for maps."""
-        from dataclasses import replace
+        return replace(
+            self, positions=16, places_refined=2, nearby=4, candidates=32, judged=30, marched=5, generations=30, refined=1
+        )
 
-        return replace(self, positions=16, places_refined=2, nearby=4, candidates=24, judged=30, marched=5, generations=25, refined=1)
+    def shorter(self) -> "SearchOptions":
+        """The same demands where a grasp of a like object is known."""
+        return replace(self, positions=self.positions // 3, places_refined=1, marched=3, refined=1)

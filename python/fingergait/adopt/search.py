@@ -15,7 +15,7 @@ from fingergait.adopt.evaluate import Judge, Judged
 from fingergait.adopt.family import FAMILIES, ObjectSpec
 from fingergait.adopt.funnel import Funnel
 from fingergait.adopt.grasp import Found, Grasp
-from fingergait.adopt.improve import improved, pose_of
+from fingergait.adopt.improve import improved, moved_grasp, pose_of
 from fingergait.adopt.library import Library, draw_library
 from fingergait.adopt.options import SearchOptions
 from fingergait.adopt.places import Place, around, at_place, marched
@@ -34,19 +34,27 @@ def search_object(
     options: SearchOptions | None = None,
     axis: Array | None = None,
     library: Library | None = None,
+    near: Grasp | None = None,
 ) -> Found:
-    """Grasps of one object that can turn it about `axis` (in the hand's world; absent: against gravity)."""
+    """Grasps of one object that can turn it about `axis` (in the hand's world; absent: against gravity).
+
+    `near`: a grasp of a like object, from which the local search begins too; the rest of the search is then shorter.
+    """
     begin = time.perf_counter()
     options = options or SearchOptions()
+    if near is not None:
+        options = options.shorter()
     library = library or draw_library(hand, options.samples, options.seed)
     rng = np.random.default_rng([options.seed, FAMILIES.index(spec.family), *(round(1e6 * x) for x in spec.size)])
     judge = Judge(hand, spec, library, task_frame(hand, axis), options)
     funnel = Funnel()
     poses = object_positions(spec, judge.clearance, library, judge.frame, options, rng, funnel)
     places = _places(judge, poses, funnel, rng)
-    near = [around(place.pose, judge.spec, options.nearby, rng) for place in places[: options.places_refined]]
-    places = sorted([*places, *(p for own in near for p in _places(judge, own, funnel, rng))], key=lambda p: p.over)
+    closer = [around(place.pose, judge.spec, options.nearby, rng) for place in places[: options.places_refined]]
+    places = sorted([*places, *(p for own in closer for p in _places(judge, own, funnel, rng))], key=lambda p: p.over)
     starts = [judged for place in places[: options.marched] for judged in marched(judge, place, funnel)]
+    if near is not None:
+        starts += moved_grasp(judge, near, funnel)
     starts.sort(key=lambda judged: -judged.merit)
     best = [improved(judge, start, funnel, rng) for start in _apart(starts, options.refined)]
     good = sorted((judged for judged in best if judged.merit > 0.0), key=lambda judged: -judged.merit)

@@ -22,7 +22,7 @@ from fingergait.adopt.view import HandView, write_finger
 Array = NDArray[np.float64]
 
 _ALPHA = (1e-4, 0.0, 1e3)  # small forces, no memory, the wrench: what is not delivered is what cannot be
-_SLACK_SHARE = 0.2  # of the weight: the unit of slack
+SLACK_SHARE = 0.2  # of the weight: the unit of slack
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Statics:
 
     def slack(self, contacts: Contacts, away: int | None) -> float:
         """The most that stays undelivered at the full torque limits, in units of a fifth of the weight (torque by R)."""
-        return self.excess(contacts, 1.0, away) / _SLACK_SHARE
+        return self.excess(contacts, 1.0, away) / SLACK_SHARE
 
     def holding(self, contacts: Contacts, away: int | None) -> Holding:
         """The largest load factor over all corners; infinite where friction alone forbids."""
