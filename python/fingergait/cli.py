@@ -132,6 +132,32 @@ def synthesize(
 
 
 @app.command()
+def grasps(
+    hand: Annotated[str, typer.Argument(metavar="HAND.xml", help="A packaged hand's name, or an MJCF file.")] = "hand",
+    family: Annotated[
+        list[str] | None, typer.Option("--object", metavar="FAMILY", help="cylinder, ball or box; all by default.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(help="Of the objects, kg; by default what the hand should carry.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where grasps.json and map.png go.")] = Path("runs/grasps"),
+    quick: Annotated[bool, typer.Option("--quick", help="Less effort: shorter strokes may be found.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; all cores by default.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Search the grasps from which a hand can turn objects; say what forbids the others."""
+    from fingergait.adopt.command import run_grasps, show
+    from fingergait.adopt.family import FAMILIES
+
+    values = run_grasps(hand, tuple(family or FAMILIES), mass, out, quick, workers)
+    if as_json:
+        print_json(values)
+    else:
+        show(values, Console())
+    raise typer.Exit(DONE if any(entry["kind"] == "gait" for entry in values["objects"]) else MISSED)
+
+
+@app.command()
 def bench(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the rows and the plot go.")] = Path("runs/bench"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer steps and problems.")] = False,

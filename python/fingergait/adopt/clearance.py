@@ -21,7 +21,7 @@ FAR = 0.05  # m: distances are measured up to this
 
 @dataclass(frozen=True)
 class Asked:
-    """Clearances that are asked, m: of links from the object, of a finger from itself and the palm, of the tip's shapes."""
+    """Clearances asked, m: of links from the object, of a finger from itself and the palm, of the tip's shapes."""
 
     link: float
     own: float
@@ -115,7 +115,7 @@ class Clearance:
         links, is_tip = self.hand.links[j], self._is_tip[j]
         self._place(position, rotation)
         for i in near.nonzero()[0]:
-            self._set(links[i], frames, s, i)
+            self._set(links[i], frames, s, int(i))
             if is_tip[i]:
                 distance = self._distance(links[i], self._object, asked.link)
                 if distance < -asked.tip:
@@ -148,8 +148,8 @@ class Clearance:
         near = pairs.near(frames_j.centre[:, None], frames_k.centre[None], enough)
         for a, b, pair in zip(*near.nonzero(), strict=True):
             first, second = pairs.geoms[pair]
-            self._set(first, frames_j, a, int(pairs.first[pair]))
-            self._set(second, frames_k, b, int(pairs.second[pair]))
+            self._set(first, frames_j, int(a), int(pairs.first[pair]))
+            self._set(second, frames_k, int(b), int(pairs.second[pair]))
             distance = self._distance(first, second, least.distance)
             if distance < least.distance:
                 least = Gap(distance, (self.hand.geom_name(first), self.hand.geom_name(second)))
@@ -182,14 +182,16 @@ class Clearance:
 class _Pairs:
     """Pairs of geoms, their places in two lists of geoms, and how far apart their centres must be at least."""
 
-    def __init__(self, pairs: tuple[tuple[int, int], ...], a: tuple[int, ...], b: tuple[int, ...], bound: Array) -> None:
+    def __init__(
+        self, pairs: tuple[tuple[int, int], ...], a: tuple[int, ...], b: tuple[int, ...], bound: Array
+    ) -> None:
         self.geoms = pairs
         self.first = np.array([a.index(x) for x, _ in pairs], dtype=np.intp)
         self.second = np.array([b.index(x) for _, x in pairs], dtype=np.intp)
         self._bound = np.array([bound[x] + bound[y] for x, y in pairs])
 
     def near(self, a: Array, b: Array, enough: float) -> NDArray[np.bool_]:
-        """(..., pairs): whether the pairs' bounding spheres, at centres (..., A, 3) and (..., B, 3), come nearer than `enough`."""
+        """(..., pairs): whether bounding spheres at centres (..., A, 3) and (..., B, 3) come nearer than `enough`."""
         d = a[..., self.first, :] - b[..., self.second, :]
         return np.asarray((d * d).sum(axis=-1) < (self._bound + enough) ** 2)
 

@@ -11,13 +11,14 @@ from fingergait.adopt.funnel import Funnel
 from fingergait.adopt.library import Library
 from fingergait.adopt.options import SearchOptions
 from fingergait.adopt.statics import Contacts, Load, Pressing, Statics, pressing
-from fingergait.adopt.stroke import Poses, limit_by_links, march, surface
+from fingergait.adopt.stroke import Poses, Rows, limit_by_links, march, surface
 from fingergait.adopt.view import HandView
 
 Array = NDArray[np.float64]
 
 DELIVERED = 1e-3  # of the weight: what the QP's soft wrench leaves of a wrench that can be delivered is far less
 _FURTHER = 0.02
+
 
 @dataclass(frozen=True)
 class Touches:
@@ -51,7 +52,9 @@ class Judged:
 class Judge:
     """Judges grasps of one hand and one object."""
 
-    def __init__(self, hand: HandView, spec: ObjectSpec, library: Library, frame: Array, options: SearchOptions) -> None:
+    def __init__(
+        self, hand: HandView, spec: ObjectSpec, library: Library, frame: Array, options: SearchOptions
+    ) -> None:
         self.hand, self.spec, self.library, self.frame, self.options = hand, spec, library, frame, options
         self.clearance = Clearance(hand, spec, library.chains)
         load = Load(spec.mass, spec.radius, options.friction, options.disturbance)
@@ -88,9 +91,7 @@ class Judge:
         postures = chain.at(q)
         contact = surface(self.spec, chain, postures.centre, poses, self.rims[j], more)
         own = np.array([self.statics.own_torque(j, angles) for angles in q])
-        return pressing(
-            contact.place, contact.normal, chain.jacobian(postures, contact.place), own, poses.position
-        )
+        return pressing(contact.place, contact.normal, chain.jacobian(postures, contact.place), own, poses.position)
 
     def contacts(self, q: tuple[Array, ...], position: Array, turn: float, more: float = 0.0) -> Contacts:
         """Contacts of a grasp whose tips touch the object at this pose, turned on by `more`."""
@@ -117,7 +118,13 @@ class Judge:
         return over, failing
 
     def judge(
-        self, touches: list[Touches], rows: Array, poses: Poses, funnel: Funnel | None, keep: int = 1, than: float = -np.inf
+        self,
+        touches: list[Touches],
+        rows: Rows,
+        poses: Poses,
+        funnel: Funnel | None,
+        keep: int = 1,
+        than: float = -np.inf,
     ) -> list[Judged]:
         """Grasps of which the i-th has finger j as touches[j] says in row rows[i, j], the object at pose i.
 
@@ -133,7 +140,7 @@ class Judge:
         return judged
 
     def _one(
-        self, touches: list[Touches], row: Array, poses: Poses, i: int, funnel: Funnel | None, cut: float
+        self, touches: list[Touches], row: Rows, poses: Poses, i: int, funnel: Funnel | None, cut: float
     ) -> Judged:
         options = self.options
         reach = np.array([touch.reach[r] for touch, r in zip(touches, row, strict=True)])
@@ -176,7 +183,7 @@ class Judge:
         self._note(funnel, (q, position, turn), missing, failing, over)
         return verdict(missing + over)
 
-    def _neighbours(self, touches: list[Touches], row: Array, free: float) -> tuple[float, str]:
+    def _neighbours(self, touches: list[Touches], row: Rows, free: float) -> tuple[float, str]:
         """The largest turn, at most `free`, with which any two fingers stay apart, each at either end or at home."""
         angles = self.options.angles
         steps = int(np.searchsorted(angles, free + 1e-9)) - 1
@@ -190,7 +197,7 @@ class Judge:
             low, high, words = (low, middle, found) if found else (middle, high, words)
         return (float(angles[low]) if low >= 0 else 0.0), words
 
-    def _touching(self, touches: list[Touches], row: Array, step: int) -> str:
+    def _touching(self, touches: list[Touches], row: Rows, step: int) -> str:
         """Which two fingers come too near each other with each at -step, 0 or +step; empty where none do."""
         gap = self.options.finger_gap
         frames = []
@@ -203,7 +210,7 @@ class Judge:
                 return f"{found.between[0]} within {1e3 * found.distance:.1f} mm of {found.between[1]}"
         return ""
 
-    def _at_ends(self, touches: list[Touches], row: Array, poses: Poses, i: int) -> float:
+    def _at_ends(self, touches: list[Touches], row: Rows, poses: Poses, i: int) -> float:
         """The most that stays undelivered, with any one finger away, with all fingers at either end of the reserve."""
         angles = self.options.angles
         step = min(int(np.searchsorted(angles, self.options.reserve - 1e-9)), len(angles) - 1)

@@ -73,8 +73,8 @@ class ObjectSpec:
         excess = np.column_stack([rho - self.size[0], np.abs(x[:, 2]) - self.size[1]])
         return _corner(excess, np.stack([radial, axial], axis=1))
 
-    def touchable(self, place: Array, normal: Array, rim: float) -> Array:
-        """Whether contacts at `place` with outward `normal` (N, 3), in O, lie on the side, `rim` m or more from an edge."""
+    def touchable(self, place: Array, normal: Array, rim: float) -> NDArray[np.bool_]:
+        """Whether contacts at `place` with outward `normal` (N, 3), in O, lie on the side, `rim` m from any edge."""
         if self.family == "ball":
             return np.asarray(np.abs(normal[:, 2]) <= _STEEPEST)
         if self.family == "cylinder":
@@ -85,13 +85,15 @@ class ObjectSpec:
         return np.asarray((x_face | y_face) & inside[:, 2])
 
     def __str__(self) -> str:
-        names = {"cylinder": ("radius", "height"), "ball": ("radius",), "box": ("width", "depth", "height")}[self.family]
+        names = {"cylinder": ("radius", "height"), "ball": ("radius",), "box": ("width", "depth", "height")}[
+            self.family
+        ]
         full = [1e3 * x if name == "radius" else 2e3 * x for name, x in zip(names, self.size, strict=True)]
         return f"{self.family}, " + ", ".join(f"{n} {x:.0f} mm" for n, x in zip(names, full, strict=True))
 
 
 def _corner(excess: Array, normals: Array) -> tuple[Array, Array]:
-    """Distance and normal to a body that is the intersection of slabs: `excess` (N, k) over each of k, `normals` (N, k, 3)."""
+    """Distance and normal to an intersection of k slabs: `excess` (N, k) over each, and their `normals` (N, k, 3)."""
     beyond = np.maximum(excess, 0.0)
     outside = np.linalg.norm(beyond, axis=1)
     deepest = np.argmax(excess, axis=1)

@@ -14,9 +14,9 @@ STAGES = (
     "spare",
     "stroke hold",
 )
-"""room: the object off the palm; reach: tips on it; surround: contacts on enough sides; clear: links; reserve: turn that
-each finger can follow; gap: between fingers; hold: with all fingers; spare: with any one away; stroke hold: the same at
-the ends of the reserve."""
+"""room: the object off the palm; reach: tips on it; surround: contacts on enough sides; clear: links; reserve: turn
+that each finger can follow; gap: between fingers; hold: with all fingers; spare: with any one away; stroke hold:
+the same at the ends of the reserve."""
 
 
 @dataclass

@@ -1,5 +1,5 @@
-"""Local search from a grasp that is nearly good enough, or good but could turn further: small random changes, kept where
-they make it better. After each change the tips are put back on the surface."""
+"""Local search from a grasp that is nearly good enough, or good but could turn further: small random changes, kept
+where they make it better. After each change the tips are put back on the surface."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Postures:
-    """A finger at N postures: q (N, n); centre (N, 3) of the tip in W; axes and anchors (N, m, 3) of the chain's joints."""
+    """A finger at N postures: q (N, n), the tip's centre (N, 3) in W, axes and anchors (N, m, 3) of the joints."""
 
     q: Array
     centre: Array

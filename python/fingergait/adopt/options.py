@@ -28,10 +28,13 @@ class SearchOptions:
         Share of a joint's range that stays free at either end of it, at the ends of the stroke too.
     rim
         Least distance of a contact from an edge of the object, in tip radii.
-    samples, positions, places_refined, nearby, candidates, combinations, judged, marched, generations, offspring, refined
-        Effort: postures of each finger, places of the object, how many of
-        them are looked at more closely and how often, contacts of each finger at each place, combinations of
-        them that are drawn and judged, places whose strokes are looked at, and rounds, size and starting grasps of the local search.
+    samples, positions, places_refined, nearby, candidates
+        Effort: postures of each finger; places of the object; how many of them are looked at more closely, and how
+        often; contacts of each finger at each place.
+    combinations, judged, marched
+        Effort: combinations of contacts drawn and judged at each place; places whose strokes are looked at.
+    generations, offspring, refined
+        Effort: rounds, size and starting grasps of the local search.
     seed
         The same seed gives the same grasps, whatever the number of processes.
     """
@@ -73,7 +76,15 @@ class SearchOptions:
     def quick(self) -> "SearchOptions":
         """The same demands with less effort: for maps."""
         return replace(
-            self, positions=16, places_refined=2, nearby=4, candidates=32, judged=30, marched=5, generations=30, refined=1
+            self,
+            positions=16,
+            places_refined=2,
+            nearby=4,
+            candidates=32,
+            judged=30,
+            marched=5,
+            generations=30,
+            refined=1,
         )
 
     def shorter(self) -> "SearchOptions":

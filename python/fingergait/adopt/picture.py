@@ -18,7 +18,7 @@ _WORDS = {
 
 
 def write_map(search: GraspSearch, path: Path) -> None:
-    """Writes the map as a PNG: a row a family, a column a radius, bars of stroke, and the first reason where none is."""
+    """Writes the map as a PNG: a row a family, a column a size, bars of stroke, and the first reason where none is."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch

@@ -10,7 +10,7 @@ from fingergait.adopt.family import ObjectSpec
 from fingergait.adopt.funnel import Funnel
 from fingergait.adopt.positions import NEAR, widest_gap
 from fingergait.adopt.statics import Pressing
-from fingergait.adopt.stroke import Poses, onto_surface, surface
+from fingergait.adopt.stroke import Poses, Rows, onto_surface, surface
 
 Array = NDArray[np.float64]
 
@@ -24,12 +24,12 @@ _WIDE = 0.75  # of the widest gap that friction allows: gaps up to this are equa
 
 @dataclass(frozen=True)
 class Place:
-    """The object at one pose: contacts q[j] (k_j, n_j) of each finger, combinations rows (c, n) of them, best first, and
-    what the best leaves undelivered (see `Judge.overload`)."""
+    """The object at one pose: contacts q[j] (k_j, n_j) of each finger, combinations rows (c, n) of them, best first,
+    and what the best leaves undelivered (see `Judge.overload`)."""
 
     pose: Poses
     q: list[Array]
-    rows: Array
+    rows: Rows
     over: float
 
 
@@ -54,7 +54,7 @@ def at_place(judge: Judge, pose: Poses, funnel: Funnel, rng: np.random.Generator
     wide = np.maximum(gaps / (np.pi + 2.0 * np.arctan(options.friction)), _WIDE)
     scored: dict[tuple[int, ...], float] = {}
 
-    def score(row: Array) -> float:
+    def score(row: Rows) -> float:
         key = tuple(int(r) for r in row)
         if key not in scored:
             bound = sorted(scored.values())[_KEPT - 1] if len(scored) >= _KEPT else np.inf
@@ -121,8 +121,11 @@ def _lasting(judge: Judge, j: int, q: Array, pose: Poses, funnel: Funnel) -> Arr
         why = touch.ended[far][int(touch.reach[far].argmin())]
         words = reserve_words(judge.hand.fingers[j].name, float(reach[far]), judge.options.reserve, why)
         funnel.misses("reserve", float(reach[far]), words)
-        return q[np.argsort(-reach, kind="stable")[:_NEARLY]]
-    return q[reach >= judge.options.reserve - 1e-9]
+        kept = np.argsort(-reach, kind="stable")[:_NEARLY]
+    else:
+        kept = np.flatnonzero(reach >= judge.options.reserve - 1e-9)
+    nearly: Array = q[kept]
+    return nearly
 
 
 def around(pose: Poses, spec: ObjectSpec, count: int, rng: np.random.Generator) -> Poses:

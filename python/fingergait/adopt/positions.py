@@ -8,7 +8,7 @@ from fingergait.adopt.family import ObjectSpec
 from fingergait.adopt.funnel import Funnel
 from fingergait.adopt.library import Library
 from fingergait.adopt.options import SearchOptions
-from fingergait.adopt.stroke import Poses
+from fingergait.adopt.stroke import Poses, Rows
 
 Array = NDArray[np.float64]
 
@@ -73,8 +73,8 @@ def _grid(library: Library, rng: np.random.Generator) -> tuple[Array, float]:
 
 def _touches(
     spec: ObjectSpec, library: Library, poses: Poses, options: SearchOptions, funnel: Funnel
-) -> tuple[Array, list[list[Array]]]:
-    """Poses that every tip can nearly touch, and, for each finger and pose, normals (k, 3) in W of what it can touch."""
+) -> tuple[Rows, list[list[Array]]]:
+    """Poses that every tip can nearly touch, and for each finger and pose the normals (k, 3) in W that it can touch."""
     count, rotations = len(poses.position), poses.rotation()
     normals: list[list[Array]] = []
     missed = np.zeros((count, len(library.chains)))
@@ -95,7 +95,9 @@ def _touches(
         best = int(missed.max(axis=1).argmin())
         j = int(missed[best].argmax())
         by = f"by {1e3 * missed[best, j]:.0f} mm" if np.isfinite(missed[best, j]) else "its side altogether"
-        funnel.misses("reach", 0.0, f"where the other tips reach the object, finger {library.chains[j].finger.name} misses {by}")
+        funnel.misses(
+            "reach", 0.0, f"where the other tips reach the object, finger {library.chains[j].finger.name} misses {by}"
+        )
     return all_touch, [[own[p] for p in all_touch] for own in normals]
 
 
@@ -128,7 +130,7 @@ def widest_gap(azimuth: Array) -> Array:
     return widest
 
 
-def _spread(position: Array, rank: Array, apart: float, most: int) -> Array:
+def _spread(position: Array, rank: Rows, apart: float, most: int) -> Rows:
     """The first of `rank` that lie apart from each other, filled up with the first that don't."""
     kept: list[int] = []
     for index in rank:

@@ -27,7 +27,6 @@ from fingergait.adopt.view import HandView
 Array = NDArray[np.float64]
 
 
-
 def search_object(
     hand: HandView,
     spec: ObjectSpec,
@@ -126,9 +125,7 @@ def as_grasp(judge: Judge, judged: Judged, kind: str) -> Grasp:
         spared=tuple(judge.statics.holding(contacts, j).factor for j in range(judge.n)),
         slack=tuple(judge.statics.slack(contacts, j) for j in range(judge.n)),
         joint_margin=float(min(margin.min() for margin in margins)),
-        link_clearance=min(
-            clearance.link_to_object(j, frames[j], judged.position, rotation) for j in range(judge.n)
-        ),
+        link_clearance=min(clearance.link_to_object(j, frames[j], judged.position, rotation) for j in range(judge.n)),
         finger_gap=min(clearance.between(j, k, frames[j], frames[k], FAR).distance for j, k in hand.between),
         palm_clearance=clearance.palm_to_object(judged.position, rotation),
     )

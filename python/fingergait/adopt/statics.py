@@ -41,7 +41,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Pressing:
-    """One contact: its columns G (6, 3) of the grasp map, J (3, n_j) with tau_j = J' f, the finger's own weight (n_j,)."""
+    """One contact: columns G (6, 3) of the grasp map, J (3, n_j) with tau_j = J' f, the finger's own weight (n_j,)."""
 
     G: Array
     J: Array
@@ -146,7 +146,7 @@ class Statics:
         return most
 
     def slack(self, contacts: Contacts, away: int | None) -> float:
-        """The most that stays undelivered at the full torque limits, in units of a fifth of the weight (torque by R)."""
+        """The most that stays undelivered at the full torque limits, in fifths of the weight (torque by R)."""
         return self.excess(contacts, 1.0, away) / SLACK_SHARE
 
     def holding(self, contacts: Contacts, away: int | None) -> Holding:

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from fingergait.adopt.clearance import Asked, Clearance
 from fingergait.adopt.family import ObjectSpec
-from fingergait.adopt.kinematics import Chain, Frames, apply, cross, damped_inverse
+from fingergait.adopt.kinematics import Chain, apply, cross, damped_inverse
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 _PULL = 0.1  # share of the way back to the first posture that a step takes, where the contact leaves it free
 _JUMP = 125.0  # rad/m: joint motion a step may take for each metre that the surface moves
+_SLIP = 0.02  # share of the surface's motion that the damping of a nearly singular posture may leave
 _STUCK = 2e-4  # m: a tip that is off the surface by more after its correction has lost it
 
 
@@ -41,7 +43,7 @@ class Poses:
         """Rotations (len(more), 3, 3) of O in W of one row, turned on by `more`."""
         return self.frame @ _about_z(self.turn[row] + more)
 
-    def take(self, rows: Array) -> "Poses":
+    def take(self, rows: Rows) -> "Poses":
         """These rows only."""
         return Poses(self.position[rows], self.turn[rows], self.frame)
 
@@ -60,10 +62,12 @@ class Surface:
     distance: Array
     normal: Array
     place: Array
-    touchable: Array
+    touchable: NDArray[np.bool_]
 
 
-def surface(spec: ObjectSpec, chain: Chain, centre: Array, poses: Poses, rim: float, more: Array | float = 0.0) -> Surface:
+def surface(
+    spec: ObjectSpec, chain: Chain, centre: Array, poses: Poses, rim: float, more: Array | float = 0.0
+) -> Surface:
     """Where tips with these centres (N, 3) touch or would touch the object, turned on by `more`."""
     R = poses.rotation(more)
     x = apply(R.transpose(0, 2, 1), centre - poses.position)
@@ -75,8 +79,8 @@ def surface(spec: ObjectSpec, chain: Chain, centre: Array, poses: Poses, rim: fl
 
 def onto_surface(
     spec: ObjectSpec, chain: Chain, q: Array, poses: Poses, rim: float, margin: float, steps: int = 4
-) -> tuple[Array, Array]:
-    """Postures (N, n) moved so that the tip touches the object at rest, by Newton's steps along the normal, and which do.
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures (N, n) moved by Newton's steps so that the tip touches the object at rest, and which then do.
 
     `margin`: share of each joint's range that stays free at either end.
     """
@@ -127,7 +131,8 @@ def march(
         v = dt[:, None] * cross(axis, lever) - contact.distance[:, None] * contact.normal
         pull = _PULL * (home - q)
         move = apply(damped_inverse(J), v - apply(J, pull)) + pull
-        jump = np.abs(move).max(axis=1) > _JUMP * np.abs(dt) * np.linalg.norm(lever, axis=1)
+        slip = np.linalg.norm(apply(J, move) - v, axis=1) > _SLIP * np.linalg.norm(v, axis=1)
+        jump = slip | (np.abs(move).max(axis=1) > _JUMP * np.abs(dt) * np.linalg.norm(lever, axis=1))
         q_new = q + np.clip(move, -0.3, 0.3)
         postures = chain.at(q_new)
         contact = surface(spec, chain, postures.centre, poses, rim, signs * angles[step])

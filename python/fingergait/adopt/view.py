@@ -1,6 +1,6 @@
 """What the grasp search needs to know of a hand: fingers as joints, tips and motors in a compiled model.
 
-Joint limits, torque limits and couplings are data of each joint; the collision shapes are those of the hand's own model.
+Joint limits, torque limits and couplings are data of each joint; the collision shapes are the hand's own.
 """
 
 from dataclasses import dataclass, field
@@ -117,7 +117,7 @@ class HandView:
         return up
 
     def qpos(self, q: list[Array] | tuple[Array, ...]) -> Array:
-        """Positions (nq,) of the whole hand with finger j at q[j] (n_j,); other joints stay where the model has them."""
+        """Positions (nq,) of the hand with finger j at q[j] (n_j,); other joints stay where the model has them."""
         qpos: Array = self.model.qpos0.copy()
         for finger, angles in zip(self.fingers, q, strict=True):
             write_finger(self.model, finger, angles, qpos)
@@ -159,9 +159,7 @@ class CollisionRule:
         self._model = model
         signatures = model.exclude_signature if model.nexclude else ()
         self._excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in signatures}
-        self._explicit = {
-            frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
-        }
+        self._explicit = {frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)}
 
     def collide(self, a: int, b: int) -> bool:
         """Whether geoms a and b may collide."""
