@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait.adopt.clearance import FAR
-from fingergait.adopt.evaluate import Judge, Judged
+from fingergait.adopt.evaluate import DELIVERED, Judge, Judged
 from fingergait.adopt.family import FAMILIES, ObjectSpec
 from fingergait.adopt.funnel import Funnel
 from fingergait.adopt.grasp import Found, Grasp
-from fingergait.adopt.improve import improved, moved_grasp, pose_of
+from fingergait.adopt.improve import improved, judged_again, moved_grasp, pose_of
 from fingergait.adopt.library import Library, draw_library
 from fingergait.adopt.options import SearchOptions
 from fingergait.adopt.places import Place, around, at_place, marched
@@ -62,8 +62,10 @@ def search_object(
         kind = "regrasp"
         good = _all_fingers_only(judge, best + starts)
     grasps = tuple(as_grasp(judge, judged, kind) for judged in good)
-    stage = "" if kind == "gait" and grasps else funnel.first
-    words = reason(judge, funnel, stage) if stage else ""
+    stage, words = "", ""
+    if not grasps or kind != "gait":
+        stage = funnel.first or "reserve"  # where only a closer look at every step of the stroke found what forbids
+        words = reason(judge, funnel, stage) or "links come too near each other or the object within the reserve"
     return Found(spec, grasps, stage, words, time.perf_counter() - begin)
 
 
@@ -78,14 +80,16 @@ def task_frame(hand: HandView, axis: Array | None) -> Array:
 
 def _all_fingers_only(judge: Judge, candidates: list[Judged]) -> list[Judged]:
     """Those candidates that hold with all fingers and have the reserve, though a finger can't be spared."""
-    good = []
-    for judged in candidates:
-        if judged.stroke < judge.options.reserve:
-            continue
+    good: list[Judged] = []
+    for candidate in sorted(candidates, key=lambda one: -one.stroke):
+        if candidate.stroke < judge.options.reserve or len(good) == judge.options.refined:
+            break
+        judged = judged_again(judge, candidate)
         contacts = judge.contacts(judged.q, judged.position, judged.turn)
-        if judge.statics.excess(contacts, judge.options.load_limit, None, 1e-3) <= 1e-3:
+        held = judge.statics.excess(contacts, judge.options.load_limit, None, DELIVERED) <= DELIVERED
+        if held and judged.stroke >= judge.options.reserve:
             good.append(judged)
-    return sorted(good, key=lambda judged: -judged.stroke)[: judge.options.refined]
+    return sorted(good, key=lambda judged: -judged.stroke)
 
 
 def _places(judge: Judge, poses: Poses, funnel: Funnel, rng: np.random.Generator) -> list[Place]:

@@ -92,6 +92,7 @@ class Statics:
         self._qp = ForceOptimizer(np.broadcast_to(edges, (n, 3, load.edges)).copy(), np.array(_ALPHA))
         self._lower = np.concatenate([finger.torque_lower for finger in hand.fingers])
         self._upper = np.concatenate([finger.torque_upper for finger in hand.fingers])
+        self._size = np.maximum(np.maximum(self._upper, -self._lower), 1e-9)
         starts = np.cumsum([0, *(finger.n for finger in hand.fingers)])
         self.slices = [slice(int(a), int(b)) for a, b in zip(starts[:-1], starts[1:], strict=True)]
         self.wrenches = _corners(hand.up, float(np.linalg.norm(hand.gravity)), load)
@@ -133,7 +134,7 @@ class Statics:
         """
         lower, upper = share * self._lower - contacts.own, share * self._upper - contacts.own
         if lower.max() >= 0.0 or upper.min() <= 0.0:
-            over = max(float((lower / -self._lower).max()), float((-upper / self._upper).max()))
+            over = max(float((lower / self._size).max()), float((-upper / self._size).max()))
             return 1.0 + over  # the fingers can't carry themselves
         G, case = contacts.G * self._scale[:, None], self.n if away is None else away
         order, cap, most = self._hardest[case], self._caps[case], 0.0
