@@ -51,7 +51,7 @@ bench: setup
 	cargo bench --workspace --locked
 	$(BIN)/fingergait bench
 
-RECORD := $(BIN)/python -m fingergait.record lift-and-rotate
+RECORD := $(BIN)/python -m fingergait.run.record lift-and-rotate
 RECORDINGS := crates/fg-core/benches/data
 # The sensors that users have: noise, encoders of 12 bits, a pose at 60 Hz that is 30 ms late.
 SENSORS := position_noise=2e-4 orientation_noise=2e-3 contact_place_noise=3e-4 contact_force_noise=0.05 \

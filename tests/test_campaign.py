@@ -22,8 +22,8 @@ from fingergait.campaign import cluster, trial
 from fingergait.campaign.build import build_id
 from fingergait.campaign.store import Store, row_schema
 from fingergait.cli import main
+from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario, parse_override
-from fingergait.simulate import simulate
 
 SPEC = """
 scenario = "hold"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fingergait.cli import main
-from fingergait.log import Log
 from fingergait.paths import MODELS
+from fingergait.run.log import Log
 
 
 def call(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fingergait as fg
-from fingergait.metrics import CHANNELS
-from fingergait.pose_error import pose_errors
+from fingergait.run.metrics import CHANNELS
+from fingergait.run.pose_error import pose_errors
 
 
 def run(name: str, **overrides: object) -> fg.Run:

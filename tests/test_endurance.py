@@ -12,12 +12,12 @@ import pytest
 
 from fingergait import _core
 from fingergait.hand import hand_json
-from fingergait.loss import LossMonitor
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
-from fingergait.reference import Trajectory
+from fingergait.run.loss import LossMonitor
+from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario
-from fingergait.simulate import load_controller
+from fingergait.scenario.reference import Trajectory
+from fingergait.sim.plant import MujocoPlant
 
 SECONDS = float(os.environ.get("FINGERGAIT_ENDURANCE_S", "30"))
 PARTS = 12

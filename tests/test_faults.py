@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
-from fingergait.faults import KINDS
-from fingergait.injection import Injection
-from fingergait.model import OBJECT, SceneModel, build_scene
-from fingergait.plant import MujocoPlant
+from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
-from fingergait.simulate import simulate
+from fingergait.scenario.faults import KINDS
+from fingergait.sim.injection import Injection
+from fingergait.sim.plant import MujocoPlant
+from fingergait.sim.scene import OBJECT, SceneModel, build_scene
 
 Array = NDArray[np.float64]
 

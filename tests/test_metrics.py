@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from fingergait._core import ConfigError
-from fingergait.log import Log, columns
-from fingergait.loss import LossMonitor
-from fingergait.metrics import Timing, metrics_of, recovery_time, settling_times, step_times
-from fingergait.pose_error import pose_errors, yaw_reached
-from fingergait.sampling import missed, sampled
+from fingergait.run.log import Log, columns
+from fingergait.run.loss import LossMonitor
+from fingergait.run.metrics import Timing, metrics_of, recovery_time, settling_times, step_times
+from fingergait.run.pose_error import pose_errors, yaw_reached
+from fingergait.run.sampling import missed, sampled
 from fingergait.scenario import Disturbance, Scenario
 
 STEP = (0.004, 0.0, 0.010, 0.0, 0.0, 0.5)
@@ -243,7 +243,7 @@ def test_the_suites_limits() -> None:
 
 
 def test_a_missing_gl_library_costs_the_pictures_only(tmp_path: Path) -> None:
-    code = "from fingergait.report.film import film_strip; import sys; print(film_strip(*sys.argv[1:]))"
+    code = "from fingergait.run.report.film import film_strip; import sys; print(film_strip(*sys.argv[1:]))"
     log = tmp_path / "log.parquet"
     make_log(Scenario.build({"name": "case"}), 50).write(log)
     done = subprocess.run(

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from fingergait._core import ConfigError
-from fingergait.model import OBJECT, build_scene, torque_limits
-from fingergait.plant import MujocoPlant
 from fingergait.scenario import Scenario
-from fingergait.start import nominal_start
+from fingergait.sim.plant import MujocoPlant
+from fingergait.sim.scene import OBJECT, build_scene, torque_limits
+from fingergait.sim.start import nominal_start
 
 N, M = 4, 3  # fingers, joints
 

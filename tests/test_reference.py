@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from fingergait.reference import Trajectory
 from fingergait.scenario import ReferenceConfig
+from fingergait.scenario.reference import Trajectory
 
 MOTION = {"lift": 0.011, "yaw_rate": 0.2, "swing_amplitude": 0.1}
 STEP = [0.004, 0.004, 0.01, 0.0, 0.0, 0.5]

@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner
 
 from fingergait.cli import app
-from fingergait.log import Log
 from fingergait.reproduce import limits
 from fingergait.reproduce.ablations import CONDITIONS, VARIANTS, ablation_cases
 from fingergait.reproduce.analysis import analyse
@@ -19,6 +18,7 @@ from fingergait.reproduce.experiments import all_experiments
 from fingergait.reproduce.gaits import completed_gaits, gait_figures, measured_rate
 from fingergait.reproduce.limits import Limit, Trial, bisect
 from fingergait.reproduce.pool import run_case, run_jobs
+from fingergait.run.log import Log
 from fingergait.scenario import Scenario, parse_override
 
 

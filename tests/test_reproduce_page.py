@@ -18,7 +18,8 @@ from fingergait.reproduce.experiments.step import step
 from fingergait.reproduce.limits import Bisection, Trial, all_limits
 from fingergait.reproduce.page import figure, limit_row, write_page
 from fingergait.reproduce.pool import run_case
-from fingergait.reproduce.run import Reproduction, as_json
+from fingergait.reproduce.result import Reproduction
+from fingergait.reproduce.run import as_json
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _PROBE = """<script>addEventListener("load", () => {

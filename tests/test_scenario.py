@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fingergait._core import ConfigError
+from fingergait.object.shapes import Shape
 from fingergait.paths import MODELS
 from fingergait.scenario import Scenario, parse_override
-from fingergait.shapes import Shape
 
 BAD: dict[str, Any] = {
     "object.masss": (0.5, "object.masss: expected one of shape, size, mass, found an unknown key"),

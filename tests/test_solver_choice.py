@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fingergait as fg
-from fingergait.pose_error import pose_errors
+from fingergait.run.pose_error import pose_errors
 
 POSITION, ANGLE, TORQUE = 1e-6, 1e-5, 1e-4
 """m, rad, N m: what two runs may differ by. Both solvers certify forces to 1e-7 N; contact, and each gait's event, pass

@@ -1,6 +1,9 @@
 """Model-based finger gaits for multi-fingered hands: robust in-hand rotation of unknown objects, with a certificate."""
 
-from fingergait import gl as gl  # before anything that imports MuJoCo
+from fingergait.sim import gl as gl  # before anything that imports MuJoCo
+
+# isort: split
+from fingergait import _former_names as _former_names
 from fingergait import synthesis
 from fingergait._core import (
     ArtifactError,
@@ -23,10 +26,10 @@ from fingergait._core import (
     gait_lp,
 )
 from fingergait.hand import hand_json
-from fingergait.log import Log
-from fingergait.plant import MujocoPlant, Plant
+from fingergait.run.log import Log
+from fingergait.run.simulate import Run, simulate
 from fingergait.scenario import Scenario
-from fingergait.simulate import Run, simulate
+from fingergait.sim.plant import MujocoPlant, Plant
 
 __all__ = [
     "ArtifactError",

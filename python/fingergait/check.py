@@ -7,9 +7,9 @@ import numpy as np
 from fingergait._core import ArtifactError, ConfigError, Controller, DualStagePlanner, HandModel
 from fingergait.hand import compile_spec, find_fingers, hand_json, load_spec
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
+from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario
-from fingergait.simulate import load_controller
+from fingergait.sim.plant import MujocoPlant
 
 
 def describe_file(file: Path) -> str:

@@ -33,7 +33,7 @@ def run(
     video: Annotated[Path | None, typer.Option(metavar="FILE.mp4", help="Write a video.")] = None,
 ) -> None:
     """Run a scenario; write its log, plots and film strip."""
-    from fingergait.run import run_scenario
+    from fingergait.run.command import run_scenario
 
     overrides = dict(map(parse_override, set_ or []))
     given = {"duration": duration, "seed": seed, "controller.file": controller}
@@ -57,8 +57,8 @@ def suite(
     as_json: Json = False,
 ) -> None:
     """Run the sampled suite: every seed draws object, grasp, errors of the model and noise at once."""
-    from fingergait.report.suite_table import SuiteTable
-    from fingergait.suite import run_suite
+    from fingergait.run.report.suite_table import SuiteTable
+    from fingergait.run.suite import run_suite
 
     table = SuiteTable(seeds, Console(stderr=True) if as_json else Console())
     with table:
@@ -82,7 +82,7 @@ def campaign(
     """Run a campaign of sampled scenarios; write its data set and report."""
     from fingergait.campaign.command import Options, run_campaign
     from fingergait.campaign.spec import CampaignSpec
-    from fingergait.report.campaign_table import show
+    from fingergait.campaign.table import show
 
     figures = run_campaign(CampaignSpec.load(spec, samples), Options(workers, scheduler, resume, out))
     if as_json:
@@ -102,8 +102,8 @@ def reproduce(
     as_json: Json = False,
 ) -> None:
     """Run the paper's experiments and past them; write a page with each claim beside what was measured."""
-    from fingergait.report.claim_table import show_claims
     from fingergait.reproduce.run import reproduce as run_all
+    from fingergait.reproduce.table import show_claims
 
     summary = run_all(out, quick, workers)
     if as_json:

@@ -23,10 +23,10 @@ from fingergait.bench.instances import (
 from fingergait.bench.peers import installed
 from fingergait.hand import hand_json
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
-from fingergait.reference import Trajectory
+from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario
-from fingergait.simulate import load_controller
+from fingergait.scenario.reference import Trajectory
+from fingergait.sim.plant import MujocoPlant
 
 STEPS = 60  # of each sequence of force problems
 

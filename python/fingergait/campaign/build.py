@@ -10,6 +10,9 @@ import numpy as np
 import fingergait
 from fingergait import _core
 
+_WINGS = ("hand", "object", "scenario", "sim", "run")
+"""What decides how a run goes."""
+
 
 @cache
 def build_id() -> str:
@@ -18,9 +21,8 @@ def build_id() -> str:
     for version in (_core.__version__, mujoco.mj_versionString(), np.__version__):
         digest.update(version.encode())
     root = Path(fingergait.__file__).resolve().parent
-    for path in sorted([*root.glob("*.py"), root / "campaign" / "trial.py", Path(_core.__file__)]):
-        digest.update(path.name.encode() + path.read_bytes())
-    models = root / "models"
-    for path in sorted([*models.glob("*.xml"), *(models / "controllers").glob("*.json")]):
+    sources = [path for wing in _WINGS for path in (root / wing).rglob("*.py")]
+    models = [*(root / "models").rglob("*.xml"), *(root / "models" / "controllers").glob("*.json")]
+    for path in sorted([*sources, root / "campaign" / "trial.py", Path(_core.__file__), *models]):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]

@@ -16,6 +16,7 @@ from fingergait.campaign.causes import cause, status
 from fingergait.campaign.cluster import connect, default_workers, run_all
 from fingergait.campaign.progress import CampaignProgress
 from fingergait.campaign.replay import replay
+from fingergait.campaign.report import write_campaign_page
 from fingergait.campaign.sampling import Sample, Sampler
 from fingergait.campaign.spec import CampaignSpec
 from fingergait.campaign.statistics import summary
@@ -23,9 +24,8 @@ from fingergait.campaign.store import Store, row_schema, write_atomic
 from fingergait.campaign.trial import Outcome, Trial
 from fingergait.hand import hand_json
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
-from fingergait.report.campaign import write_campaign_page
-from fingergait.simulate import load_controller, versions
+from fingergait.run.simulate import load_controller, versions
+from fingergait.sim.plant import MujocoPlant
 
 _CHECKED = 64  # samples whose values are checked before anything runs
 

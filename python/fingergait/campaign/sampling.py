@@ -12,8 +12,8 @@ from scipy.stats import qmc
 from fingergait._core import ConfigError
 from fingergait.campaign.draw import Draw
 from fingergait.campaign.spec import CampaignSpec, FaultDraw
-from fingergait.model import true_inertia
 from fingergait.scenario import Scenario
+from fingergait.sim.scene import true_inertia
 
 Array = NDArray[np.float64]
 

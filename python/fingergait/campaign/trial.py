@@ -11,11 +11,11 @@ import numpy as np
 from fingergait import _core
 from fingergait.campaign.build import build_id
 from fingergait.hand import compile_spec, find_fingers, load_spec
-from fingergait.log import Log
-from fingergait.model import true_inertia
 from fingergait.paths import find
+from fingergait.run.log import Log
+from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
-from fingergait.simulate import simulate
+from fingergait.sim.scene import true_inertia
 
 METRICS: dict[str, type] = {
     "duration_s": float,

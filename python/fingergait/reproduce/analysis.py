@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait.log import Log
-from fingergait.metrics import CHANNELS
-from fingergait.pose_error import pose_errors
 from fingergait.reproduce.constraint import active_constraints
 from fingergait.reproduce.gaits import gait_figures
+from fingergait.run.log import Log
+from fingergait.run.metrics import CHANNELS
+from fingergait.run.pose_error import pose_errors
 from fingergait.scenario import Disturbance, Scenario
 
 Array = NDArray[np.float64]

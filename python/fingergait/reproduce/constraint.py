@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait.hand import compile_spec, find_fingers, load_spec
-from fingergait.log import Log
 from fingergait.paths import find
+from fingergait.run.log import Log
 from fingergait.scenario import Scenario
 
 Flags = NDArray[np.bool_]

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fingergait.metrics import CHANNELS, SETTLED
 from fingergait.reproduce.case import Outcome
 from fingergait.reproduce.gaits import SLIDE, measured_rate
 from fingergait.reproduce.style import AXES, BAD, GOOD, GREY, INK, panels, shade, styled, thin
+from fingergait.run.metrics import CHANNELS, SETTLED
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait.log import Log
+from fingergait.run.log import Log
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from fingergait.reproduce.claim import Claim
 from fingergait.reproduce.experiment import Experiment
 from fingergait.reproduce.limit_figure import limit_figure
 from fingergait.reproduce.limits import Bisection, Limit
-from fingergait.reproduce.run import Reproduction, settings_of
+from fingergait.reproduce.result import Reproduction, settings_of
 from fingergait.reproduce.style import png, svg
 
 

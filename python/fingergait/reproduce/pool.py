@@ -12,11 +12,11 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from fingergait.log import Log
-from fingergait.report.film import film_strip
 from fingergait.reproduce.analysis import analyse, trace_of
 from fingergait.reproduce.case import Case, Outcome
-from fingergait.simulate import simulate
+from fingergait.run.log import Log
+from fingergait.run.report.film import film_strip
+from fingergait.run.simulate import simulate
 
 Job = tuple[str, float, Callable[..., Any], tuple[Any, ...]]
 """Label, simulated seconds (the bar's measure), a function of a module, and its arguments."""

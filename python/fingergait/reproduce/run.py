@@ -1,49 +1,18 @@
 """The work of `fingergait reproduce`: all runs, the verdicts, the page and the JSON file."""
 
 import json
-import os
-import platform
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from fingergait._core import ConfigError
-from fingergait.reproduce.ablations import Cell, ablation_cases, ablation_table
-from fingergait.reproduce.case import Case, Outcome
-from fingergait.reproduce.claim import Claim
-from fingergait.reproduce.experiment import Experiment
+from fingergait.reproduce.ablations import ablation_cases, ablation_table
+from fingergait.reproduce.case import Case
 from fingergait.reproduce.experiments import all_experiments
 from fingergait.reproduce.limits import Bisection, Limit, all_limits, bisect_by_key
 from fingergait.reproduce.pool import Job, run_case, run_jobs
-from fingergait.simulate import load_controller
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """Everything that the page shows.
-
-    claims, outcomes
-        By experiment key; by case key.
-    bisections
-        By limit key.
-    ablations
-        By variant and condition.
-    """
-
-    quick: bool
-    seconds: float
-    experiments: list[Experiment]
-    claims: dict[str, list[Claim]]
-    outcomes: dict[str, Outcome]
-    limits: list[Limit]
-    bisections: dict[str, list[Bisection]]
-    ablations: dict[str, dict[str, Cell]]
-
-    @property
-    def all_claims(self) -> list[Claim]:
-        """The claims of all experiments, in the page's order."""
-        return [claim for experiment in self.experiments for claim in self.claims[experiment.key]]
+from fingergait.reproduce.result import Reproduction, settings_of
 
 
 def reproduce(out: Path, quick: bool, workers: int, quiet: bool = False) -> dict[str, Any]:
@@ -127,22 +96,4 @@ def as_json(result: Reproduction, report: Path) -> dict[str, Any]:
             for variant, row in result.ablations.items()
         },
         **settings_of(result),
-    }
-
-
-def settings_of(result: Reproduction) -> dict[str, Any]:
-    """Versions, simulator settings, controller and machine of the runs."""
-    shown = next(iter(result.outcomes.values()))
-    metrics, scenario = shown.metrics, shown.case.scenario
-    controller = load_controller(scenario)
-    return {
-        "controller": {
-            "artefact": scenario.controller.file,
-            "kind": controller.kind,
-            "rate_hz": scenario.controller.rate_hz,
-            "nominal_mass_kg": controller.mass,
-        },
-        "versions": metrics["versions"],
-        "simulator": metrics["simulator"],
-        "machine": {"system": platform.platform(terse=True), "processors": os.cpu_count()},
     }

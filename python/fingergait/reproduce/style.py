@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fingergait.report.thin import thin as report_thin
+from fingergait.run.report.thin import thin as report_thin
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")

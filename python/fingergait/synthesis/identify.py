@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter, savgol_filter
 
-from fingergait.pose_error import pose_errors
+from fingergait.run.pose_error import pose_errors
 
 from .spec import SynthesisSpec
 from .statespace import Array
 
 if TYPE_CHECKING:  # what runs a simulation is not needed to read its log
-    from fingergait.log import Log
+    from fingergait.run.log import Log
     from fingergait.scenario import Scenario
 
 _WINDOW = 1.0  # s from the start of a pulse that are used

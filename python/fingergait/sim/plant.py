@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import Command, Measurement, TorquePid
-from fingergait.config import core_config
-from fingergait.injection import Injection
-from fingergait.model import SceneModel, build_scene, torque_limits
 from fingergait.scenario import Scenario
-from fingergait.sensors import Sensors
-from fingergait.start import nominal_start
+from fingergait.scenario.core_config import core_config
+from fingergait.sim.injection import Injection
+from fingergait.sim.scene import SceneModel, build_scene, torque_limits
+from fingergait.sim.sensors import Sensors
+from fingergait.sim.start import nominal_start
 
 Array = NDArray[np.float64]
 

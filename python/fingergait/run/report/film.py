@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fingergait import gl
+from fingergait.sim import gl
 
 _ADVICE = "install one: apt-get install libegl1 libgl1-mesa-dri (EGL) or libosmesa6 (OSMesa)"
 _LIBRARIES = ("egl", "osmesa")
@@ -41,7 +41,7 @@ def _render(kind: str, log: Path, output: Path) -> str | None:
         environment = {**os.environ, "MUJOCO_GL": library}
         if library == "egl":
             environment.setdefault("MUJOCO_EGL_DEVICE_ID", "0")
-        command = [sys.executable, "-m", "fingergait.report.render", kind, str(log), str(output)]
+        command = [sys.executable, "-m", "fingergait.run.report.render", kind, str(log), str(output)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode == 0:
             return None

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError, Diagnostics
-from fingergait.sensors import Sensors
+from fingergait.sim.sensors import Sensors
 
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _GROW = 4096  # rows added at a time

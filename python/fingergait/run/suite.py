@@ -7,9 +7,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 from fingergait._core import FingergaitError
-from fingergait.sampling import missed, sampled
+from fingergait.run.sampling import missed, sampled
+from fingergait.run.simulate import simulate
 from fingergait.scenario import parse_override
-from fingergait.simulate import simulate
 
 ROW = (
     "seed",

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fingergait.log import Log
-from fingergait.pose_error import pose_errors
-from fingergait.report.thin import thin
+from fingergait.run.log import Log
+from fingergait.run.pose_error import pose_errors
+from fingergait.run.report.thin import thin
 from fingergait.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
-from fingergait.model import OBJECT, SceneModel
 from fingergait.scenario import Scenario
+from fingergait.sim.scene import OBJECT, SceneModel
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fingergait._core import ConfigError
-from fingergait.faults import KINDS, Fault
-from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
+from fingergait.object.shapes import SIZES, Shape
 from fingergait.paths import find
-from fingergait.shapes import SIZES, Shape
+from fingergait.scenario.faults import KINDS, Fault
+from fingergait.scenario.fields import NonNegative, Positive, Table, Twist, Vector
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait.log import Log
-from fingergait.model import SceneModel, torque_limits
-from fingergait.pose_error import yaw_reached
+from fingergait.run.log import Log
+from fingergait.run.pose_error import yaw_reached
 from fingergait.scenario import Scenario
+from fingergait.sim.scene import SceneModel, torque_limits
 
 Array = NDArray[np.float64]
 

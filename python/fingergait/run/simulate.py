@@ -13,14 +13,14 @@ import numpy as np
 
 from fingergait import _core
 from fingergait.hand import hand_json
-from fingergait.log import Log, columns, describe
-from fingergait.loss import LossMonitor, reason
-from fingergait.metrics import Timing, metrics_of
-from fingergait.model import settings, torque_limits
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
-from fingergait.reference import Trajectory
+from fingergait.run.log import Log, columns, describe
+from fingergait.run.loss import LossMonitor, reason
+from fingergait.run.metrics import Timing, metrics_of
 from fingergait.scenario import Scenario
+from fingergait.scenario.reference import Trajectory
+from fingergait.sim.plant import MujocoPlant
+from fingergait.sim.scene import settings, torque_limits
 
 Watcher = Callable[[MujocoPlant, "Log"], bool | None]
 """Called about every 16 ms of simulated time; True ends the run."""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fingergait.scenario import ReferenceConfig
+from fingergait.scenario.scenario import ReferenceConfig
 
 Array = NDArray[np.float64]
 

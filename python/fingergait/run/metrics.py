@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait.log import Log
-from fingergait.pose_error import pose_errors, yaw_reached
+from fingergait.run.log import Log
+from fingergait.run.pose_error import pose_errors, yaw_reached
 from fingergait.scenario import Disturbance, Scenario
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Renders a log's poses: `python -m fingergait.report.render strip|video LOG OUTPUT`, with MUJOCO_GL set."""
+"""Renders a log's poses: `python -m fingergait.run.report.render strip|video LOG OUTPUT`, with MUJOCO_GL set."""
 
 import json
 import sys
@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from fingergait import gl
-from fingergait.log import Log
-from fingergait.model import SceneModel, build_scene
-from fingergait.pose_error import yaw_reached
+from fingergait.run.log import Log
+from fingergait.run.pose_error import yaw_reached
 from fingergait.scenario import Scenario
+from fingergait.sim import gl
+from fingergait.sim.scene import SceneModel, build_scene
 
 _FRAMES = 8
 _FPS = 30

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import Measurement
-from fingergait.injection import Injection
-from fingergait.model import TOUCH_SIZE, SceneModel
 from fingergait.scenario import SensorConfig
+from fingergait.sim.injection import Injection
+from fingergait.sim.scene import TOUCH_SIZE, SceneModel
 
 Array = NDArray[np.float64]
 

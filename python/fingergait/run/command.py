@@ -12,14 +12,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fingergait._core import ConfigError
-from fingergait.log import Log
-from fingergait.plant import MujocoPlant
-from fingergait.report.film import film_strip, video_problem
-from fingergait.report.film import video as write_video
-from fingergait.report.plots import write_plots
-from fingergait.report.table import show
+from fingergait.run.log import Log
+from fingergait.run.report.film import film_strip, video_problem
+from fingergait.run.report.film import video as write_video
+from fingergait.run.report.plots import write_plots
+from fingergait.run.report.table import show
+from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
-from fingergait.simulate import simulate
+from fingergait.sim.plant import MujocoPlant
 
 
 def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
 
-from fingergait.sampling import ORIENTATION_LIMIT, POSITION_LIMIT
+from fingergait.run.sampling import ORIENTATION_LIMIT, POSITION_LIMIT
 
 _HEAD = "seed  radius  h/2   mass  true  inertia  yaw    turned     position  orientation  gaits  verdict"
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait import faults as kinds
 from fingergait._core import ConfigError
-from fingergait.model import OBJECT, SceneModel
+from fingergait.scenario import faults as kinds
+from fingergait.sim.scene import OBJECT, SceneModel
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from fingergait.scenario import Scenario
+from fingergait.scenario.scenario import Scenario
 
 
 def core_config(scenario: Scenario, tau_max: float) -> str:

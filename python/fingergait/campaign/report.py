@@ -9,6 +9,7 @@ import jinja2
 import numpy as np
 import pyarrow as pa
 
+from fingergait.campaign.plots import Nominal, box_figure, error_figure, image, influence_figure, trend_figure
 from fingergait.campaign.sensitivity import influences
 from fingergait.campaign.spec import CampaignSpec
 from fingergait.campaign.statistics import (
@@ -20,7 +21,6 @@ from fingergait.campaign.statistics import (
 )
 from fingergait.campaign.store import write_atomic
 from fingergait.paths import find
-from fingergait.report.campaign_plots import Nominal, box_figure, error_figure, image, influence_figure, trend_figure
 
 _SHOWN = 12  # failures listed for each cause
 
@@ -57,7 +57,7 @@ def write_campaign_page(
         "influence": influence_figure(found),
         "trend": trend_figure(rows, found),
     }
-    text = environment.get_template("campaign.html").render(
+    text = environment.get_template("report.html").render(
         spec=spec,
         described=json.dumps(spec.model_dump(mode="json", exclude_defaults=True), indent=2),
         figures=figures,

@@ -19,10 +19,10 @@ import numpy as np
 from fingergait import _core
 from fingergait.hand import hand_json
 from fingergait.paths import find
-from fingergait.plant import MujocoPlant
-from fingergait.reference import Trajectory
+from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario, parse_override
-from fingergait.simulate import load_controller
+from fingergait.scenario.reference import Trajectory
+from fingergait.sim.plant import MujocoPlant
 
 FORMAT = "fingergait-recording/2"
 
@@ -61,8 +61,8 @@ def record(scenario: Scenario, out: Path) -> int:
 
 
 def main() -> None:
-    """The command `python -m fingergait.record`."""
-    parser = argparse.ArgumentParser(prog="python -m fingergait.record", description=record.__doc__)
+    """The command `python -m fingergait.run.record`."""
+    parser = argparse.ArgumentParser(prog="python -m fingergait.run.record", description=record.__doc__)
     parser.add_argument("scenario", help="a packaged scenario's name, or a TOML file")
     parser.add_argument("out", type=Path, help="the file to write")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a scenario key")
