@@ -49,12 +49,32 @@ pub enum QualityPlane {
     Object,
 }
 
+/// What starts a gait.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GaitEvent {
+    /// The paper's: Q of the whole hand below delta_Q. The finger follows the gradient of Q.
+    Quality,
+    /// The fingers' reserves. The finger goes home.
+    Reserve,
+    /// Whichever comes first.
+    Both,
+}
+
 /// Parameters of the velocity-level gait planner, eqs. (1) to (5).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaitConfig {
     /// False: all fingers always hold the object.
     pub enabled: bool,
+    /// What starts a gait. Deviation: the paper has Q alone, which starts too late where one finger runs out first.
+    pub event: GaitEvent,
+    /// Slow the desired motion down where the fingers' reserves would run out; without effect where `event` is `quality`.
+    /// Deviation: not in the paper.
+    pub govern: bool,
+    /// How far beyond home a finger goes, as a share of half of what it travels from one gait to the next. Deviation: not
+    /// in the paper.
+    pub lead: f64,
     /// Weight of the object grasp quality Q_o, 1/m^2, eq. (1).
     pub w1: f64,
     /// Weight of the hand manipulability Q_h, eq. (1).
@@ -126,6 +146,9 @@ impl Default for GaitConfig {
     fn default() -> Self {
         Self {
             enabled: true,
+            event: GaitEvent::Quality,
+            govern: true,
+            lead: 0.0,
             w1: 0.99,
             w2: 0.02,
             w_z: 8.0,
@@ -281,6 +304,7 @@ impl Config {
         let ranges = [
             ("rate_hz", self.rate_hz, 20.0, 20_000.0),
             ("mass", self.mass.unwrap_or(1.0), positive, 1e3),
+            ("gait.lead", g.lead, 0.0, 2.0),
             ("gait.w1", g.w1, 0.0, 1e6),
             ("gait.w2", g.w2, 0.0, 1e6),
             ("gait.w_z", g.w_z, 0.0, 1e6),

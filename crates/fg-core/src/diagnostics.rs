@@ -1,5 +1,6 @@
 //! What a control step decided, and why, as plain numbers.
 
+use crate::gait::march::MarchEnd;
 use crate::gait::planner::GaitRate;
 use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
@@ -57,6 +58,16 @@ pub struct Diagnostics {
     /// Answers of each solver since the start, and how often and why one passed the QP on to the next. Not in the log,
     /// which has each step's solver and residual.
     pub solver_counts: SolverCounters,
+    /// For how long each finger can follow the desired motion, s; infinite where it does not turn, or where that is not known.
+    pub reserve: DVector<f64>,
+    /// What ended each finger's last march along the motion.
+    pub reserve_end: Vec<MarchEnd>,
+    /// Slack of the schedule of gaits, s.
+    pub slack: f64,
+    /// Share of its rate at which the desired motion goes on.
+    pub pace: f64,
+    /// What it has fallen behind, m and rad.
+    pub lag: Vector6<f64>,
     /// Friction coefficient that the force optimiser assumes.
     pub friction: f64,
     /// What was wrong with this step's measurement, or with the step itself.
@@ -93,6 +104,11 @@ impl Diagnostics {
             kkt: 0.0,
             iterations: 0,
             solver_counts: SolverCounters::default(),
+            reserve: DVector::from_element(n_fingers, f64::INFINITY),
+            reserve_end: vec![MarchEnd::Open; n_fingers],
+            slack: f64::INFINITY,
+            pace: 1.0,
+            lag: Vector6::zeros(),
             friction: 0.0,
             faults: Faults::default(),
             safe_mode: SafeMode::Normal,
@@ -125,6 +141,10 @@ impl Diagnostics {
         show("solver", &[f64::from(self.solver as u8)]);
         show("kkt", &[self.kkt]);
         show("iterations", &[self.iterations as f64]);
+        show("reserve", self.reserve.as_slice());
+        show("slack", &[self.slack]);
+        show("pace", &[self.pace]);
+        show("lag", self.lag.as_slice());
         show("friction", &[self.friction]);
         show("faults", &[f64::from(self.faults.bits())]);
         show("safe_mode", &[f64::from(self.safe_mode as u8)]);

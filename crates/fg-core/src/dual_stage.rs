@@ -1,15 +1,15 @@
 //! The dual-stage planner: one control step from sensors to torques. The only file that knows the order.
 
-mod fallback;
-mod report;
-
 use crate::config::Config;
 use crate::diagnostics::Diagnostics;
 use crate::error::Error;
 use crate::friction::FrictionPyramid;
 use crate::gait::planner::{GaitPlanner, GaitRate};
+use crate::gait::governor::Governor;
 use crate::gait::quality::QualityModel;
-use crate::gait::supervisor::{Phase, Supervisor};
+use crate::gait::reserve::Reserve;
+use crate::gait::schedule::Schedule;
+use crate::gait::supervisor::{GaitEnd, Phase, Supervisor};
 use crate::gait::velocity_force::VelocityForceController;
 use crate::grasp::{Grasp, Scene};
 use crate::hand::{HandModel, HandState, TorqueLimits};
@@ -24,6 +24,38 @@ use crate::signals::{Command, Measurement, Reference};
 use crate::spatial::{angular, linear};
 use nalgebra::{DMatrix, DVector, Vector6};
 
+/// The present scene; a macro, so that only the fields it reads are borrowed.
+macro_rules! scene {
+    ($planner:ident, $measurement:ident) => {
+        Scene {
+            grasp: &$planner.grasp,
+            state: &$planner.state,
+            X_WO: &$measurement.X_WO,
+            V_WD: $planner.robust.twist(),
+            q: $measurement.q.as_slice(),
+        }
+    };
+}
+
+/// Eq. (8) for the weighted wrench `F`; a macro for the same reason.
+macro_rules! force_problem {
+    ($planner:ident, $F:ident) => {
+        ForceProblem {
+            G: &$planner.G,
+            J: &$planner.grasp.J,
+            F_des: &$F,
+            f_prev: &$planner.f_prev,
+            tau_min: &$planner.tau_min,
+            tau_max: &$planner.tau_max,
+            f_normal_max: &$planner.f_limit,
+        }
+    };
+}
+
+mod choice;
+mod fallback;
+mod report;
+
 /// The whole controller. All memory is allocated in [`DualStagePlanner::new`].
 pub struct DualStagePlanner {
     hand: HandModel,
@@ -34,6 +66,13 @@ pub struct DualStagePlanner {
     grasp: Grasp,
     quality: QualityModel,
     supervisor: Supervisor,
+    reserve: Reserve,
+    schedule: Schedule,
+    governor: Governor,
+    /// Twist that is asked for, whether or not the reference stands or is governed.
+    V_asked: Vector6<f64>,
+    /// How far the finger on its way home is to go against the motion, from home, m.
+    beyond: f64,
     robust: RobustController,
     forces: ForceOptimizer,
     /// Answers "could the others hold without finger k?" without touching the warm start of `forces`.
@@ -67,34 +106,6 @@ pub struct DualStagePlanner {
 /// Time constant of the filter on Psi before it is compared with what a gait allows, s.
 const PSI_FILTER: f64 = 0.03;
 
-/// The present scene; a macro, so that only the fields it reads are borrowed.
-macro_rules! scene {
-    ($planner:ident, $measurement:ident) => {
-        Scene {
-            grasp: &$planner.grasp,
-            state: &$planner.state,
-            X_WO: &$measurement.X_WO,
-            V_WD: $planner.robust.twist(),
-            q: $measurement.q.as_slice(),
-        }
-    };
-}
-
-/// Eq. (8) for the weighted wrench `F`; a macro for the same reason.
-macro_rules! force_problem {
-    ($planner:ident, $F:ident) => {
-        ForceProblem {
-            G: &$planner.G,
-            J: &$planner.grasp.J,
-            F_des: &$F,
-            f_prev: &$planner.f_prev,
-            tau_min: &$planner.tau_min,
-            tau_max: &$planner.tau_max,
-            f_normal_max: &$planner.f_limit,
-        }
-    };
-}
-
 impl DualStagePlanner {
     /// The planner for `hand` with the robust controller `K`.
     pub fn new(hand: HandModel, K: Controller, mut config: Config) -> Result<Self, Error> {
@@ -122,6 +133,11 @@ impl DualStagePlanner {
             grasp: Grasp::new(&hand, config.gait.contact_force),
             quality: QualityModel::new(&hand, &config.gait),
             supervisor: Supervisor::new(&hand, &config.gait, dt),
+            reserve: Reserve::new(&hand, dt),
+            schedule: Schedule::new(&hand, &config.gait, dt),
+            governor: Governor::new(dt),
+            V_asked: Vector6::zeros(),
+            beyond: 0.0,
             robust: RobustController::new(K, &config.robust, config.mass, &hand.gravity(), dt)?,
             forces: ForceOptimizer::new(&pyramids, n_q, settings.clone())?,
             probe: ForceOptimizer::new(&pyramids, n_q, settings)?,
@@ -182,7 +198,11 @@ impl DualStagePlanner {
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
             Course::Run => {
-                let (measurement, reference) = self.guard.take();
+                let (measurement, used) = self.guard.take();
+                if reference.V_WD.iter().all(|V| V.abs() < 100.0) {
+                    self.V_asked = reference.V_WD;
+                }
+                let reference = self.govern(&used);
                 self.run(&measurement, &reference);
                 self.guard.put_back(measurement);
             }
@@ -227,6 +247,7 @@ impl DualStagePlanner {
         let first = self.supervisor.observe(&self.grasp);
         if first {
             self.quality.set_first_grasp(&scene);
+            self.reserve.set_first_grasp(&scene);
         }
         let quality = self.quality.quality(&scene);
         if first {
@@ -237,12 +258,17 @@ impl DualStagePlanner {
         for (j, h) in self.diagnostics.heights.iter_mut().enumerate() {
             *h = self.quality.height_error(&scene, j);
         }
+        self.look_ahead(measurement);
         let before = self.supervisor.phase();
         let overload = self.overload(&self.psi_filtered);
-        self.supervisor.advance(&self.grasp, quality.Q, self.diagnostics.rate.Q_dot, overload);
+        let arrived = self.arrived(measurement);
+        self.supervisor.advance(&self.grasp, quality.Q, self.diagnostics.rate.Q_dot, overload, arrived);
         if let (true, Some(k)) = (self.supervisor.phase() != before, self.supervisor.sliding_finger()) {
             self.planner.reset();
             self.velocity_force.reset(self.grasp.contact(k).f_n);
+        }
+        if self.supervisor.phase() == Phase::Hold && before != Phase::Hold {
+            self.schedule.end(self.supervisor.last_end() == GaitEnd::Abort);
         }
     }
 
@@ -317,26 +343,6 @@ impl DualStagePlanner {
         }
     }
 
-    /// Frees a finger where the event asks for it and the force optimiser finds that the others can hold.
-    fn choose_finger(&mut self, measurement: &Measurement, F_des: &Vector6<f64>) {
-        let scene = scene!(self, measurement);
-        let (delta, quality, planner) = (self.config.gait.delta, &self.quality, &mut self.planner);
-        let promises = |k| planner.potential(k, quality, &scene) > delta;
-        let now = self.diagnostics.quality;
-        let Some(k) = self.supervisor.candidate(&now, quality, &scene, promises) else { return };
-        self.f_limit.fill(self.config.force.f_n_max);
-        self.f_limit[k] = 0.0;
-        let scale = self.wrench_scale();
-        let F = F_des.component_mul(&scale);
-        let psi =
-            self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale));
-        if psi.is_ok_and(|psi| self.overload(&psi) <= 1.0) {
-            self.supervisor.start(k, &self.grasp);
-        } else {
-            self.supervisor.refuse(k);
-        }
-    }
-
     /// Eq. (8), with the free finger's force ramped or taken out.
     fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
@@ -372,7 +378,11 @@ impl DualStagePlanner {
         self.diagnostics.rate = GaitRate { Q_dot: 0.0, feasible: true };
         let Some(k) = self.supervisor.sliding_finger() else { return };
         let scene = scene!(self, measurement);
-        if self.supervisor.phase() == Phase::Slide {
+        if self.supervisor.homing_finger().is_some() {
+            let first = &self.reserve.first_posture()[self.hand.joints(k)];
+            let way = self.reserve.way(k, self.beyond, &scene);
+            self.planner.go(k, &way, first, &scene);
+        } else if self.supervisor.phase() == Phase::Slide {
             self.diagnostics.rate = self.planner.update(k, &self.quality, &scene);
         } else {
             self.planner.press(k, &scene);

@@ -13,6 +13,10 @@ impl DualStagePlanner {
         self.grasp = Grasp::new(&self.hand, self.config.gait.contact_force);
         self.quality.reset();
         self.supervisor.reset();
+        self.reserve.reset();
+        self.schedule.reset();
+        self.governor.reset();
+        self.V_asked = Vector6::zeros();
         self.release();
         self.forces.reset_counts();
         self.slip.reset();

@@ -23,6 +23,13 @@ impl DualStagePlanner {
         for j in 0..self.hand.n_fingers() {
             d.slip[j] = self.slip.speed(j);
         }
+        for j in 0..self.hand.n_fingers() {
+            d.reserve[j] = self.reserve.seconds(j);
+            d.reserve_end[j] = self.reserve.reaches(j).0.end;
+        }
+        d.slack = self.schedule.slack();
+        d.pace = self.governor.share();
+        d.lag = *self.governor.lag();
         d.friction = self.friction.mu();
         d.slips = self.friction.slips();
         d.qd_des.copy_from_slice(self.planner.qd_des());

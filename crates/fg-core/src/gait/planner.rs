@@ -3,9 +3,10 @@
 use crate::config::GaitConfig;
 use crate::gait::quality::QualityModel;
 use crate::grasp::Scene;
-use crate::hand::HandModel;
+use crate::hand::{HandModel, Inverse};
 use crate::solver::knapsack::gait_lp;
 use crate::spatial::{angular, linear};
+use nalgebra::Vector3;
 
 /// What the LP found at one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -16,6 +17,11 @@ pub struct GaitRate {
     pub feasible: bool,
 }
 
+/// Shortest time in which a finger on its way comes to rest, s.
+const SETTLE: f64 = 0.05;
+/// Rate at which it returns to its posture, where the contact leaves it free, 1/s.
+const POSTURE: f64 = 2.0;
+
 /// Solves eq. (4) for the free finger. Allocated once.
 #[derive(Debug, Clone)]
 pub struct GaitPlanner {
@@ -23,6 +29,7 @@ pub struct GaitPlanner {
     /// Number of joints of each finger, and of the one that `a` is of: the vectors below have room for the largest.
     counts: Vec<usize>,
     n: usize,
+    dt: f64,
     /// Largest change of a joint velocity in one step, rad/s.
     sigma: f64,
     /// Desired joint velocities of the free finger, rad/s: qd_des,k.
@@ -41,6 +48,7 @@ impl GaitPlanner {
         Self {
             // The paper's sigma belongs to its 2 ms; sigma / T_s is the acceleration limit that is meant.
             sigma: config.sigma * dt / 0.002,
+            dt,
             config: config.clone(),
             counts: hand.counts(),
             n: 0,
@@ -84,6 +92,49 @@ impl GaitPlanner {
         self.constrain_to_surface(k, scene);
         self.qd_des.fill(0.0);
         self.follow_surface(k, scene);
+    }
+
+    /// Moves `qd_des` towards the joint velocities that take the contact of finger `k` along the surface by the vector `way` in
+    /// W and bring it to rest there, within (4b) and (4d); what the contact leaves free pulls to the posture `first` of the
+    /// finger, rad.
+    pub fn go(&mut self, k: usize, way: &Vector3<f64>, first: &[f64], scene: &Scene<'_>) {
+        self.constrain_to_surface(k, scene);
+        let contact = scene.grasp.contact(k);
+        let n = self.n;
+        let along = way - contact.n_W * contact.n_W.dot(way);
+        let distance = along.norm();
+        let inverse = Inverse::new(scene.state, k, &contact.p_WC);
+        let mut x = [0.0; HandModel::MAX_JOINTS];
+        inverse.near(&(along / distance.max(1e-9)), &x, &mut self.c[..n]);
+        let fastest = self.c[..n].iter().fold(1e-9, |most: f64, c| most.max(c.abs()));
+        // Half of what (4d) allows: the surface, which moves under the finger, wants some too.
+        let brake = 0.5 * self.sigma / self.dt / fastest;
+        let speed = (self.config.qd_max / fastest).min((2.0 * brake * distance).sqrt()).min(distance / SETTLE);
+        // Three joints or fewer have nothing to spare.
+        if n > 3 {
+            for ((x, first), at) in x.iter_mut().zip(first).zip(scene.state.joints(k)) {
+                *x = POSTURE * (first - scene.q[at]);
+            }
+        }
+        inverse.near(&(along * (speed / distance.max(1e-9))), &x, &mut self.c[..n]);
+        self.rate_box();
+        for i in 0..n {
+            self.qd_des[i] = self.c[i].clamp(self.lower[i], self.upper[i]);
+        }
+        self.onto_surface();
+        self.follow_surface(k, scene);
+    }
+
+    /// Takes the part along the normal out of `qd_des`.
+    fn onto_surface(&mut self) {
+        let a = &self.a[..self.n];
+        let aa: f64 = a.iter().map(|a| a * a).sum();
+        let av: f64 = a.iter().zip(&self.qd_des).map(|(a, v)| a * v).sum();
+        if aa > 1e-12 {
+            for (qd, a) in self.qd_des.iter_mut().zip(a) {
+                *qd -= a * av / aa;
+            }
+        }
     }
 
     fn follow_surface(&mut self, k: usize, scene: &Scene<'_>) {

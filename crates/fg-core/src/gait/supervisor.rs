@@ -1,6 +1,6 @@
 //! The event that starts a gait, the choice of the free finger, and the phases of a gait.
 
-use crate::config::GaitConfig;
+use crate::config::{GaitConfig, GaitEvent};
 use crate::gait::quality::{Quality, QualityModel};
 use crate::grasp::{Grasp, Scene};
 use crate::hand::HandModel;
@@ -50,6 +50,8 @@ pub enum GaitEnd {
     Abort,
     /// The free finger lost the object.
     LostContact,
+    /// The free finger has come home.
+    Home,
 }
 
 /// Time that a finger must be off the object before it counts as lost, s.
@@ -68,6 +70,8 @@ pub struct Supervisor {
     dt: f64,
     phase: Phase,
     free: usize,
+    /// The free finger goes home, instead of where Q rises.
+    homing: bool,
     /// Time in the present phase, s.
     elapsed: f64,
     /// Time in which all fingers have been in contact without a break, s.
@@ -96,6 +100,7 @@ impl Supervisor {
             dt,
             phase: Phase::Hold,
             free: 0,
+            homing: false,
             elapsed: 0.0,
             touching: 0.0,
             off: vec![0.0; n],
@@ -137,6 +142,19 @@ impl Supervisor {
     /// The finger that the velocity-force controller drives: off the force optimiser.
     pub fn sliding_finger(&self) -> Option<usize> {
         matches!(self.phase, Phase::Slide | Phase::Press).then_some(self.free)
+    }
+
+    /// The finger that slides home.
+    pub fn homing_finger(&self) -> Option<usize> {
+        (self.phase == Phase::Slide && self.homing).then_some(self.free)
+    }
+
+    /// True where a gait can begin: all fingertips in static contact since the first grasp.
+    pub fn ready(&self) -> bool {
+        self.config.enabled
+            && self.phase == Phase::Hold
+            && self.touching >= STATIC_AFTER
+            && self.threshold.is_some()
     }
 
     /// delta_Q, once the first grasp is known.
@@ -195,11 +213,7 @@ impl Supervisor {
         scene: &Scene<'_>,
         mut promises: impl FnMut(usize) -> bool,
     ) -> Option<usize> {
-        let event = self.config.enabled
-            && self.phase == Phase::Hold
-            && self.touching >= STATIC_AFTER
-            && self.threshold.is_some_and(|threshold| now.Q < threshold);
-        if !event {
+        if !(self.ready() && self.threshold.is_some_and(|threshold| now.Q < threshold)) {
             return None;
         }
         let score = |k: usize| {
@@ -218,12 +232,15 @@ impl Supervisor {
 
     /// True where the grasp has grown bad and no finger could be freed for some time: turning on would lose the object.
     pub fn overdue(&self) -> bool {
-        self.waiting > self.config.overdue_time && self.deficit > self.config.overdue_margin
+        self.config.event != GaitEvent::Reserve
+            && self.waiting > self.config.overdue_time
+            && self.deficit > self.config.overdue_margin
     }
 
-    /// Starts the gait of finger `k`.
-    pub fn start(&mut self, k: usize, grasp: &Grasp) {
+    /// Starts the gait of finger `k`, home or where Q rises.
+    pub fn start(&mut self, k: usize, grasp: &Grasp, homing: bool) {
         self.free = k;
+        self.homing = homing;
         self.f_start = grasp.contact(k).f_n;
         self.gaits += 1;
         self.enter(Phase::Unload);
@@ -251,19 +268,20 @@ impl Supervisor {
     }
 
     /// Moves through the phases. `Q` and `Q_dot` are this step's quality and the last step's LP value; `overload` is the
-    /// slack of the remaining fingers over its limit.
-    pub fn advance(&mut self, grasp: &Grasp, Q: f64, Q_dot: f64, overload: f64) {
+    /// slack of the remaining fingers over its limit; `arrived`: a finger on its way home is there.
+    pub fn advance(&mut self, grasp: &Grasp, Q: f64, Q_dot: f64, overload: f64, arrived: bool) {
         let touching = grasp.contact(self.free).touching;
         match self.phase {
             Phase::Hold => {
                 if let Some(k) = self.lost_finger(grasp) {
                     self.free = k;
+                    self.homing = false;
                     self.enter(Phase::Press);
                 }
             }
             Phase::Unload if self.elapsed >= self.config.unload_time => self.enter(Phase::Slide),
             Phase::Slide => {
-                if let Some(end) = self.slide_end(Q, Q_dot, overload) {
+                if let Some(end) = self.slide_end(Q, Q_dot, overload, arrived) {
                     self.end = end;
                     self.enter(Phase::Press);
                 }
@@ -308,7 +326,7 @@ impl Supervisor {
         (0..self.off.len()).find(|j| self.threshold.is_some() && holding && lost(j))
     }
 
-    fn slide_end(&self, Q: f64, Q_dot: f64, overload: f64) -> Option<GaitEnd> {
+    fn slide_end(&self, Q: f64, Q_dot: f64, overload: f64, arrived: bool) -> Option<GaitEnd> {
         if overload > self.config.abort_factor {
             return Some(GaitEnd::Abort);
         }
@@ -317,6 +335,10 @@ impl Supervisor {
         }
         if self.elapsed < self.config.min_slide_time {
             return None;
+        }
+        if self.homing {
+            let late = self.elapsed > self.config.max_slide_time;
+            return if arrived { Some(GaitEnd::Home) } else { late.then_some(GaitEnd::TimeOut) };
         }
         if Q_dot < self.config.delta {
             return Some(GaitEnd::NoImprovement);

@@ -1,6 +1,7 @@
 //! From the description of a hand to the form that the kinematics use.
 
 use super::limits;
+use super::outline;
 use super::{Coordinate, Finger, Follows, HandModel, Joint};
 use crate::error::Error;
 use nalgebra::{Isometry3, Matrix3, Quaternion, SymmetricEigen, Translation3, Unit, UnitQuaternion, Vector3};
@@ -75,6 +76,7 @@ impl Layout {
         if !(finger.tip.radius.is_finite() && finger.tip.radius > 0.0) {
             return Err(Error::config(at + ".tip.radius", "a radius > 0", finger.tip.radius));
         }
+        outline::check(&format!("{at}.outline"), &finger.outline, finger.joints.len())?;
         let (n, first) = (finger.joints.len(), self.coordinates.len());
         let independent = finger.joints.iter().filter(|joint| joint.follows.is_none()).count();
         if n > HandModel::MAX_LINKS || !(1..=HandModel::MAX_JOINTS).contains(&independent) {

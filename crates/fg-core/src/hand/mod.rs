@@ -5,13 +5,17 @@
 //! kinematics, and none in the arrays.
 
 mod layout;
+mod inverse;
 mod limits;
+mod outline;
 mod state;
 
 use crate::error::Error;
+pub use inverse::Inverse;
 use layout::Layout;
 pub use limits::TorqueLimits;
 use nalgebra::Vector3;
+pub use outline::{separation, Block, Part};
 use serde::{Deserialize, Serialize};
 pub use state::HandState;
 use std::ops::Range;
@@ -129,6 +133,9 @@ pub struct Finger {
     pub joints: Vec<Joint>,
     /// The fingertip.
     pub tip: Tip,
+    /// What of the finger's links may touch something, as boxes with round edges; empty: nothing is known of it.
+    #[serde(default)]
+    pub outline: Vec<Block>,
 }
 
 /// What there is to know of an independent joint, with those that follow it.
@@ -170,6 +177,8 @@ impl HandModel {
     pub const MAX_JOINTS: usize = 7;
     /// Largest number of joints of one finger, coupled ones among them.
     pub const MAX_LINKS: usize = 2 * Self::MAX_JOINTS;
+    /// Largest number of boxes in one finger's outline.
+    pub const MAX_BLOCKS: usize = 12;
 
     /// The hand described in `json` (format in ARCHITECTURE.md).
     pub fn from_json(json: &str) -> Result<Self, Error> {
@@ -241,6 +250,11 @@ impl HandModel {
     /// The unit vector in W against gravity; world z where there is none (below 1e-6 m/s^2).
     pub fn up(&self) -> Vector3<f64> {
         (-self.gravity()).try_normalize(1e-6).unwrap_or_else(Vector3::z)
+    }
+
+    /// Number of parts of the outline of finger `j`; the fingertip, a sphere, is the first.
+    pub fn n_parts(&self, j: usize) -> usize {
+        self.fingers[j].outline.len() + 1
     }
 
     /// Radius of the tip of finger `j`, m.

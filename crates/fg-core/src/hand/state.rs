@@ -1,6 +1,6 @@
 //! Kinematics of a hand, and the torques that hold it up, at one instant.
 
-use super::HandModel;
+use super::{HandModel, Part};
 use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;
 
@@ -18,11 +18,12 @@ pub struct HandState {
     chains: Vec<Vec<usize>>,
     /// True where some joint follows another.
     coupled: bool,
-    /// By link: angle, a point of the axis, the axis, the centre of mass.
+    /// By link: angle, a point of the axis, the axis, the centre of mass, the frame.
     angles: Vec<f64>,
     anchors: Vec<Vector3<f64>>,
     axes: Vec<Vector3<f64>>,
     coms: Vec<Vector3<f64>>,
+    links: Vec<Isometry3<f64>>,
     tips: Vec<Isometry3<f64>>,
 }
 
@@ -42,28 +43,48 @@ impl HandState {
             anchors: vec![Vector3::zeros(); n],
             axes: vec![Vector3::zeros(); n],
             coms: vec![Vector3::zeros(); n],
+            links: vec![Isometry3::identity(); n],
             tips: vec![Isometry3::identity(); hand.n_fingers()],
         }
     }
 
     /// Moves the state to the independent joints' angles `q`, finger by finger, rad.
     pub fn update(&mut self, hand: &HandModel, q: &[f64]) {
-        for (j, chain) in hand.layout.chains.iter().enumerate() {
-            let mut X = Isometry3::identity();
-            for &k in chain {
-                let link = &hand.layout.links[k];
-                let angle = link.ratio * q[link.at] + link.offset;
-                X *= link.X_parent;
-                let rotation = UnitQuaternion::from_axis_angle(&link.axis, angle);
-                self.angles[k] = angle;
-                self.anchors[k] = (X * nalgebra::Point3::from(link.anchor)).coords;
-                self.axes[k] = X.rotation * link.axis.into_inner();
-                let offset = link.anchor - rotation * link.anchor;
-                X *= Isometry3::from_parts(Translation3::from(offset), rotation);
-                self.coms[k] = (X * nalgebra::Point3::from(link.com)).coords;
+        for j in 0..hand.n_fingers() {
+            let joints = self.joints(j);
+            self.update_finger(hand, j, &q[joints]);
+        }
+    }
+
+    /// Moves finger `j` alone to the angles `q` of its independent joints, rad.
+    pub fn update_finger(&mut self, hand: &HandModel, j: usize, q: &[f64]) {
+        let first = self.joints[j].start;
+        let mut X = Isometry3::identity();
+        for &k in &hand.layout.chains[j] {
+            let link = &hand.layout.links[k];
+            let angle = link.ratio * q[link.at - first] + link.offset;
+            X *= link.X_parent;
+            let rotation = UnitQuaternion::from_axis_angle(&link.axis, angle);
+            self.angles[k] = angle;
+            self.anchors[k] = (X * nalgebra::Point3::from(link.anchor)).coords;
+            self.axes[k] = X.rotation * link.axis.into_inner();
+            let offset = link.anchor - rotation * link.anchor;
+            X *= Isometry3::from_parts(Translation3::from(offset), rotation);
+            self.coms[k] = (X * nalgebra::Point3::from(link.com)).coords;
+            self.links[k] = X;
+        }
+        let tip = Translation3::from(Vector3::from(hand.fingers[j].tip.position));
+        self.tips[j] = X * tip;
+    }
+
+    /// Part `i` of the outline of finger `j` in W; the fingertip is part 0.
+    pub fn part(&self, hand: &HandModel, j: usize, i: usize) -> Part {
+        match i.checked_sub(1) {
+            None => Part::ball(self.tips[j].translation.vector, hand.tip_radius(j)),
+            Some(i) => {
+                let block = &hand.fingers[j].outline[i];
+                block.at(&self.links[self.chains[j][block.joint]])
             }
-            let tip = Translation3::from(Vector3::from(hand.fingers[j].tip.position));
-            self.tips[j] = X * tip;
         }
     }
 

@@ -44,6 +44,7 @@ pub fn hand(n: usize) -> HandModel {
                 joint("j3", [LINKS[0], 0.0, 0.0], straight, [0.0, -1.0, 0.0], [-10.0, 170.0]),
             ],
             tip: Tip { position: [LINKS[1], 0.0, 0.0], radius: TIP_RADIUS },
+            outline: Vec::new(),
         }
     });
     HandModel::new(fingers.collect(), [0.0, 0.0, -9.81]).unwrap()

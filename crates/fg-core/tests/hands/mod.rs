@@ -43,7 +43,7 @@ fn finger(random: &mut Random, j: usize, n: usize, stated: bool) -> Finger {
         joints[i].follows = Some(Follows { joint: leader, ratio, offset });
     }
     let tip = Tip { position: random.vector(0.03).into(), radius: random.uniform(0.005, 0.02) };
-    Finger { name: format!("f{j}"), joints, tip }
+    Finger { name: format!("f{j}"), joints, tip, outline: Vec::new() }
 }
 
 fn joint(random: &mut Random, limited: bool) -> Joint {
