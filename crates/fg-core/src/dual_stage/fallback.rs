@@ -24,6 +24,7 @@ impl DualStagePlanner {
         self.assume_friction();
         self.planner.reset();
         self.velocity_force.reset(0.0);
+        self.posture.reset();
         self.limiter.reset();
         self.command.tau.fill(0.0);
         self.diagnostics = Diagnostics::new(&self.hand.counts());
