@@ -263,6 +263,7 @@ impl DualStagePlanner {
             *h = self.quality.height_error(&scene, j);
         }
         self.look_ahead(measurement);
+        self.retreat(measurement);
         let before = self.supervisor.phase();
         let overload = self.overload(&self.psi_filtered);
         let arrived = self.arrived(measurement);
@@ -383,13 +384,14 @@ impl DualStagePlanner {
         if self.supervisor.homing_finger().is_some() {
             let first = &self.reserve.first_posture()[self.hand.joints(k)];
             let way = self.reserve.way(k, self.beyond, &scene);
-            self.planner.go(k, &way, first, &scene);
+            self.planner.go(k, &way, first, self.supervisor.lifted(), &scene);
         } else if self.supervisor.phase() == Phase::Slide {
             self.diagnostics.rate = self.planner.update(k, &self.quality, &scene);
         } else {
             self.planner.press(k, &scene);
         }
-        let (qd_des, f_des) = (self.planner.qd_des(), self.config.gait.f_des);
+        let qd_des = self.planner.qd_des();
+        let f_des = if self.supervisor.lifted() { 0.0 } else { self.config.gait.f_des };
         self.velocity_force.update(k, &self.hand, &scene, qd_des, f_des, &mut self.tau_free);
         for (at, tau) in self.hand.joints(k).zip(&self.tau_free) {
             self.command.tau[at] = tau + self.tau_own[at];

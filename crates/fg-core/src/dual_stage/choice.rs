@@ -38,6 +38,27 @@ impl DualStagePlanner {
         self.schedule.update(|j| reserve.seconds(j), gone, free);
     }
 
+    /// Sends a finger home that touches the object with its link, or that has looked for it in vain.
+    ///
+    /// A tip that feels nothing while its finger is loaded and does not advance is a dead sensor, or the finger lies on the object
+    /// with its link; where its outline says that a link is at the object, it is the latter.
+    pub(super) fn retreat(&mut self, measurement: &Measurement) {
+        if !(self.by_reserve() && self.reserve.turns()) {
+            return;
+        }
+        let scene = scene!(self, measurement);
+        let vain = self.supervisor.vain_finger();
+        let silent = |j: &usize| self.guard.silent(*j) && self.reserve.link_near(*j, &scene);
+        let free = self.supervisor.free_finger();
+        let lying = (0..self.hand.n_fingers()).filter(|_| free.is_none()).find(silent);
+        if let Some(k) = lying.or(vain) {
+            self.beyond = 0.0;
+            self.supervisor.retreat(k);
+            self.planner.reset();
+            self.velocity_force.reset(0.0);
+        }
+    }
+
     /// True where the finger that slides home is there.
     pub(super) fn arrived(&self, measurement: &Measurement) -> bool {
         let Some(k) = self.supervisor.homing_finger() else { return false };

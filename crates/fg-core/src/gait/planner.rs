@@ -83,7 +83,7 @@ impl GaitPlanner {
         self.rate_box();
         let outcome =
             gait_lp(&self.c[..n], &self.a[..n], &self.lower[..n], &self.upper[..n], &mut self.qd_des[..n]);
-        self.follow_surface(k, scene);
+        self.follow_surface(k, scene, 1.0);
         GaitRate { Q_dot: outcome.value, feasible: outcome.feasible }
     }
 
@@ -91,13 +91,13 @@ impl GaitPlanner {
     pub fn press(&mut self, k: usize, scene: &Scene<'_>) {
         self.constrain_to_surface(k, scene);
         self.qd_des.fill(0.0);
-        self.follow_surface(k, scene);
+        self.follow_surface(k, scene, 1.0);
     }
 
     /// Moves `qd_des` towards the joint velocities that take the contact of finger `k` along the surface by the vector `way` in
-    /// W and bring it to rest there, within (4b) and (4d); what the contact leaves free pulls to the posture `first` of the
+    /// W and bring it to rest there, within (4b) and (4d), `lifted` off it or not; what the contact leaves free pulls to the posture `first` of the
     /// finger, rad.
-    pub fn go(&mut self, k: usize, way: &Vector3<f64>, first: &[f64], scene: &Scene<'_>) {
+    pub fn go(&mut self, k: usize, way: &Vector3<f64>, first: &[f64], lifted: bool, scene: &Scene<'_>) {
         self.constrain_to_surface(k, scene);
         let contact = scene.grasp.contact(k);
         let n = self.n;
@@ -122,7 +122,7 @@ impl GaitPlanner {
             self.qd_des[i] = self.c[i].clamp(self.lower[i], self.upper[i]);
         }
         self.onto_surface();
-        self.follow_surface(k, scene);
+        self.follow_surface(k, scene, if lifted { -1.0 } else { 1.0 });
     }
 
     /// Takes the part along the normal out of `qd_des`.
@@ -137,12 +137,14 @@ impl GaitPlanner {
         }
     }
 
-    fn follow_surface(&mut self, k: usize, scene: &Scene<'_>) {
+    /// Adds the normal velocity that follows the surface; a finger off it approaches at this share of the approach speed.
+    fn follow_surface(&mut self, k: usize, scene: &Scene<'_>, share: f64) {
         let contact = scene.grasp.contact(k);
         let arm = contact.p_WC - scene.X_WO.translation.vector;
         let surface = linear(scene.V_WD) + angular(scene.V_WD).cross(&arm);
         let follow = if self.config.follow_surface { contact.n_W.dot(&surface) } else { 0.0 };
-        let approach = if contact.touching { 0.0 } else { self.config.approach_speed };
+        let off = !contact.touching || share < 0.0;
+        let approach = if off { share * self.config.approach_speed } else { 0.0 };
         let aa: f64 = self.a[..self.n].iter().map(|a| a * a).sum();
         let scale = if aa > 1e-12 { (follow + approach) / aa } else { 0.0 };
         let limit = self.config.qd_max;

@@ -18,6 +18,8 @@ const AT_ONCE: usize = 2;
 /// Least distances of links from the object and from other fingers, by the contacts' radius.
 const CLEAR_OF_OBJECT: f64 = 0.03;
 const CLEAR_OF_FINGERS: f64 = 0.06;
+/// A link that is nearer may be what touches, by the contacts' radius.
+const AT_OBJECT: f64 = 0.06;
 /// Rate of the filter on the desired twist, rad/s: a swing passes, the turn that is coming stays.
 const TURN: f64 = 1.5;
 /// Contacts that move by less than this share of their radius in a second stand.
@@ -306,6 +308,16 @@ impl Reserve {
             }
         }
         None
+    }
+
+    /// True where a link of finger `j` is at the object or next to it, as far as its outline tells.
+    pub fn link_near(&self, j: usize, scene: &Scene<'_>) -> bool {
+        let spot = self.surface.spot(j, self.hand.tip_radius(j));
+        (1..self.hand.n_parts(j)).any(|i| {
+            let part = scene.state.part(&self.hand, j, i);
+            let clear = self.surface.clearance(j, &spot, &part, 0.0) - self.clearance_bias[j][i];
+            clear < AT_OBJECT * self.surface.size
+        })
     }
 
     /// Computes by how much the bounds of clearance are too careful at the first grasp, where nothing touched but the tips.

@@ -58,6 +58,8 @@ pub enum GaitEnd {
 const LOST_AFTER: f64 = 0.03;
 /// Time without contact after which a sliding finger only looks for the surface, s.
 const GIVE_UP_AFTER: f64 = 0.15;
+/// Time for which a finger looks for the object before it goes home for it, s.
+const SEEKS: f64 = 0.3;
 /// Time that all fingers must touch before the grasp counts as static, s.
 const STATIC_AFTER: f64 = 0.02;
 /// Time after which refused fingers are asked again, s.
@@ -72,6 +74,8 @@ pub struct Supervisor {
     free: usize,
     /// The free finger goes home, instead of where Q rises.
     homing: bool,
+    /// It does so off the object.
+    lifted: bool,
     /// Time in the present phase, s.
     elapsed: f64,
     /// Time in which all fingers have been in contact without a break, s.
@@ -101,6 +105,7 @@ impl Supervisor {
             phase: Phase::Hold,
             free: 0,
             homing: false,
+            lifted: false,
             elapsed: 0.0,
             touching: 0.0,
             off: vec![0.0; n],
@@ -147,6 +152,16 @@ impl Supervisor {
     /// The finger that slides home.
     pub fn homing_finger(&self) -> Option<usize> {
         (self.phase == Phase::Slide && self.homing).then_some(self.free)
+    }
+
+    /// True where the finger on its way home is to stay off the object.
+    pub fn lifted(&self) -> bool {
+        self.phase == Phase::Slide && self.lifted
+    }
+
+    /// The finger that has looked for the object for long without finding it.
+    pub fn vain_finger(&self) -> Option<usize> {
+        (self.phase == Phase::Press && self.elapsed > SEEKS).then_some(self.free)
     }
 
     /// True where a gait can begin: all fingertips in static contact since the first grasp.
@@ -241,9 +256,19 @@ impl Supervisor {
     pub fn start(&mut self, k: usize, grasp: &Grasp, homing: bool) {
         self.free = k;
         self.homing = homing;
+        self.lifted = false;
         self.f_start = grasp.contact(k).f_n;
         self.gaits += 1;
         self.enter(Phase::Unload);
+    }
+
+    /// Takes finger `k` off the object and home, whatever the others can do: it holds nothing with its tip.
+    pub fn retreat(&mut self, k: usize) {
+        self.free = k;
+        self.homing = true;
+        self.lifted = true;
+        self.gaits += 1;
+        self.enter(Phase::Slide);
     }
 
     /// Remembers that the other fingers cannot hold without finger `k`.
@@ -259,7 +284,7 @@ impl Supervisor {
                 self.end = GaitEnd::Abort;
                 self.enter(Phase::Load);
             }
-            Phase::Slide => {
+            Phase::Slide if !self.lifted => {
                 self.end = GaitEnd::Abort;
                 self.enter(Phase::Press);
             }
@@ -276,6 +301,7 @@ impl Supervisor {
                 if let Some(k) = self.lost_finger(grasp) {
                     self.free = k;
                     self.homing = false;
+                    self.lifted = false;
                     self.enter(Phase::Press);
                 }
             }
@@ -327,6 +353,10 @@ impl Supervisor {
     }
 
     fn slide_end(&self, Q: f64, Q_dot: f64, overload: f64, arrived: bool) -> Option<GaitEnd> {
+        if self.lifted {
+            let late = self.elapsed > self.config.max_slide_time;
+            return if arrived { Some(GaitEnd::Home) } else { late.then_some(GaitEnd::TimeOut) };
+        }
         if overload > self.config.abort_factor {
             return Some(GaitEnd::Abort);
         }

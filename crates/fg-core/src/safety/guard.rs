@@ -184,6 +184,11 @@ impl Guard {
         self.motors.drives(j)
     }
 
+    /// True where finger `j` feels nothing although it is loaded and has not advanced.
+    pub fn silent(&self, j: usize) -> bool {
+        self.touch.silent(j)
+    }
+
     /// The torque with which joint `at` of finger `j` is tested for power, N m.
     pub fn motor_test(&self, j: usize, at: usize) -> Option<f64> {
         self.motors.test(j, at)

@@ -113,6 +113,12 @@ impl TouchGuard {
         self.tips.iter().any(|tip| tip.failed.confirmed())
     }
 
+    /// True where finger `j` has felt nothing for long although it is loaded and has not advanced.
+    pub fn silent(&self, j: usize) -> bool {
+        let tip = &self.tips[j];
+        !tip.gone && tip.replaced.is_some_and(|advance| advance.time > self.config.lost_time)
+    }
+
     /// True where `tactile` are the last readings again, bit for bit.
     pub fn same(&self, tactile: &[Tactile]) -> bool {
         let same = |(tip, now): (&Tip, &Tactile)| tip.raw.f_n.to_bits() == now.f_n.to_bits();
