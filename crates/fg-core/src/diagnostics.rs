@@ -4,6 +4,7 @@ use crate::gait::march::MarchEnd;
 use crate::gait::planner::GaitRate;
 use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
+use crate::hand::HandModel;
 use crate::manipulation::force::{ForceStatus, SolverCounters, SolverUsed};
 use crate::safety::{Faults, SafeMode};
 use nalgebra::{DVector, Vector6};
@@ -142,6 +143,11 @@ impl Diagnostics {
         show("kkt", &[self.kkt]);
         show("iterations", &[self.iterations as f64]);
         show("reserve", self.reserve.as_slice());
+        let mut ends = [0.0; HandModel::MAX_FINGERS];
+        for (number, end) in ends.iter_mut().zip(&self.reserve_end) {
+            *number = f64::from(*end as u8);
+        }
+        show("reserve_end", &ends[..self.reserve_end.len()]);
         show("slack", &[self.slack]);
         show("pace", &[self.pace]);
         show("lag", self.lag.as_slice());

@@ -115,7 +115,7 @@ fn separations_never_exceed_the_distance_and_are_mostly_it() {
         let (a, points_a) = any_box(&mut random, Vector3::zeros());
         let (b, points_b) = any_box(&mut random, random_direction(&mut random) * 0.06);
         let distance = hull_distance(&points_a, &points_b);
-        let bound = separation(&a, &b);
+        let bound = separation(&a, &b, f64::INFINITY);
         assert!(bound <= distance + 2e-5, "{bound} > {distance}");
         if distance > 1e-3 {
             tried += 1;
@@ -148,7 +148,7 @@ fn clearances_never_exceed_the_distance_from_a_cylinder_or_a_ball() {
             let axis = [Vector3::new(0.0, 0.0, -1.0), Vector3::new(0.0, 0.0, 1.0)];
             hull_distance(&points, &axis) - RADIUS
         };
-        let bound = surface.clearance(0, &spot, &part, 0.0);
+        let bound = surface.bounds(0, &spot, 0.0).clearance(&part, f64::INFINITY);
         if truth > 0.0 {
             assert!(bound <= truth + 3e-4, "ball {ball}: {bound} > {truth}");
             close += u32::from(bound > truth - 0.1 * RADIUS);
@@ -259,7 +259,7 @@ fn a_ball_is_told_by_leaning_normals_and_a_cylinder_is_not() {
         let contacts = contacts(&mut random, ball);
         surface.learn(&contacts, &Vector3::zeros(), &spin(0.1));
         let part = Part::ball(Vector3::new(0.8, 0.0, -0.8) * RADIUS, 0.05 * RADIUS);
-        let clear = surface.clearance(0, &surface.spot(0, TIP), &part, 0.0) > 0.0;
+        let clear = surface.bounds(0, &surface.spot(0, TIP), 0.0).clearance(&part, f64::INFINITY) > 0.0;
         assert_eq!(clear, ball);
     }
 }

@@ -14,10 +14,14 @@ use nalgebra::{Vector3, Vector6};
 const STEPS: usize = 24;
 const PER_SIZE: f64 = 30.0;
 /// Steps taken in one control step.
-const AT_ONCE: usize = 2;
+const AT_ONCE: usize = 1;
+/// One march in this many goes back.
+const BACK: usize = 4;
 /// Least distances of links from the object and from other fingers, by the contacts' radius.
-const CLEAR_OF_OBJECT: f64 = 0.03;
+const CLEAR_OF_OBJECT: f64 = 0.015;
 const CLEAR_OF_FINGERS: f64 = 0.06;
+/// What a grasp search leaves free between links and the object at the first grasp, by the contacts' radius.
+const CLEAR_AT_FIRST: f64 = 0.06;
 /// A link that is nearer may be what touches, by the contacts' radius.
 const AT_OBJECT: f64 = 0.06;
 /// Rate of the filter on the desired twist, rad/s: a swing passes, the turn that is coming stays.
@@ -60,6 +64,8 @@ pub struct Reserve {
     V: [Vector6<f64>; 2],
     first: First,
     known: bool,
+    /// The object has begun to turn since: home is where the contacts were then.
+    begun: bool,
     /// Axis of motion for which the bounds at the first grasp were computed, and by how much they are below what must be so:
     /// by finger and part, and by pair of fingers, m.
     calibrated: Option<Vector3<f64>>,
@@ -71,8 +77,9 @@ pub struct Reserve {
     parts: Vec<Vec<Vec<Part>>>,
     last: Vec<usize>,
     march: Option<March>,
-    /// The finger marched last, and which way.
+    /// Marches begun, and whether the present one goes ahead.
     turn: usize,
+    forward: bool,
 }
 
 impl Reserve {
@@ -87,6 +94,7 @@ impl Reserve {
             V: [Vector6::zeros(); 2],
             first: First { q: vec![0.0; hand.n_q()], contacts: Vec::with_capacity(n), origin: Vector3::zeros() },
             known: false,
+            begun: false,
             calibrated: None,
             clearance_bias: (0..n).map(|j| vec![0.0; hand.n_parts(j)]).collect(),
             gap_bias: vec![vec![0.0; n]; n],
@@ -96,6 +104,7 @@ impl Reserve {
             last: vec![0; n],
             march: None,
             turn: 0,
+            forward: true,
             hand: hand.clone(),
         }
     }
@@ -104,6 +113,7 @@ impl Reserve {
     pub fn reset(&mut self) {
         self.V = [Vector6::zeros(); 2];
         self.known = false;
+        self.begun = false;
         self.calibrated = None;
         self.turn = 0;
         self.forget();
@@ -115,13 +125,18 @@ impl Reserve {
         self.back.fill(Reach::UNKNOWN);
     }
 
-    /// Takes the present contacts and postures as home.
+    /// The first grasp is complete. Home is where the contacts are once the object is about to move, settled by then.
     pub fn set_first_grasp(&mut self, scene: &Scene<'_>) {
+        self.take_home(scene);
+        self.known = true;
+        self.begun = false;
+    }
+
+    fn take_home(&mut self, scene: &Scene<'_>) {
         self.first.q.copy_from_slice(scene.q);
         self.first.contacts.clear();
         self.first.contacts.extend_from_slice(scene.grasp.contacts());
         self.first.origin = scene.X_WO.translation.vector;
-        self.known = true;
         self.calibrated = None;
         self.forget();
     }
@@ -216,6 +231,10 @@ impl Reserve {
             self.forget();
             return;
         }
+        if !self.begun && scene.grasp.n_touching() == self.hand.n_fingers() {
+            self.begun = true;
+            self.take_home(scene);
+        }
         let axis = angular(&self.V[1]).try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
         if self.calibrated.is_none_or(|known| (known - axis).norm() > 0.2) {
             self.calibrate(axis);
@@ -237,7 +256,7 @@ impl Reserve {
             self.begin(scene, free);
             return;
         };
-        let (j, forward) = (march.finger, self.turn % 2 == 0);
+        let (j, forward) = (march.finger, self.forward);
         let joints = self.hand.joints(j);
         let ended = march.step(&self.hand, &mut self.scratch, &self.surface, &self.first.q[joints]);
         let ended = ended.or_else(|| self.blocked(&march, forward));
@@ -266,8 +285,11 @@ impl Reserve {
     /// Begins the next finger's march from where it is now.
     fn begin(&mut self, scene: &Scene<'_>, free: Option<usize>) {
         let n = self.hand.n_fingers();
-        self.turn = (self.turn + 1) % (2 * n);
-        let (j, forward) = (self.turn / 2, self.turn % 2 == 0);
+        self.turn += 1;
+        let back = self.turn % BACK == 0;
+        let j = if back { self.turn / BACK } else { self.turn - self.turn / BACK } % n;
+        let forward = !back;
+        self.forward = forward;
         if Some(j) == free || !scene.grasp.contact(j).touching {
             return;
         }
@@ -290,19 +312,18 @@ impl Reserve {
 
     /// What is too near the links of the finger on its march, if anything is.
     fn blocked(&self, march: &March, forward: bool) -> Option<MarchEnd> {
-        let (j, t, size) = (march.finger, march.seconds(), self.surface.size);
+        let (j, size) = (march.finger, self.surface.size);
+        let bounds = self.surface.bounds(j, &march.spot, march.seconds());
         for i in 0..self.hand.n_parts(j) {
             let part = self.scratch.part(&self.hand, j, i);
-            if i > 0 {
-                let clear = self.surface.clearance(j, &march.spot, &part, t) - self.clearance_bias[j][i];
-                if clear < CLEAR_OF_OBJECT * size {
-                    return Some(MarchEnd::Link);
-                }
+            let needed = CLEAR_OF_OBJECT * size + self.clearance_bias[j][i];
+            if i > 0 && bounds.clearance(&part, needed) < needed {
+                return Some(MarchEnd::Link);
             }
             for k in (0..self.hand.n_fingers()).filter(|k| *k != j) {
                 let step = if forward { march.steps.min(self.last[k]) } else { 0 };
-                let near = CLEAR_OF_FINGERS * size + self.gap_bias[j][k];
-                if self.parts[k][step].iter().any(|other| closer(&part, other, near)) {
+                let needed = CLEAR_OF_FINGERS * size + self.gap_bias[j][k];
+                if self.parts[k][step].iter().any(|other| separation(&part, other, needed) < needed) {
                     return Some(MarchEnd::Neighbour);
                 }
             }
@@ -312,11 +333,11 @@ impl Reserve {
 
     /// True where a link of finger `j` is at the object or next to it, as far as its outline tells.
     pub fn link_near(&self, j: usize, scene: &Scene<'_>) -> bool {
-        let spot = self.surface.spot(j, self.hand.tip_radius(j));
+        let bounds = self.surface.bounds(j, &self.surface.spot(j, self.hand.tip_radius(j)), 0.0);
         (1..self.hand.n_parts(j)).any(|i| {
             let part = scene.state.part(&self.hand, j, i);
-            let clear = self.surface.clearance(j, &spot, &part, 0.0) - self.clearance_bias[j][i];
-            clear < AT_OBJECT * self.surface.size
+            let near = AT_OBJECT * self.surface.size + self.clearance_bias[j][i];
+            bounds.clearance(&part, near) < near
         })
     }
 
@@ -327,11 +348,11 @@ impl Reserve {
         self.scratch.update(&self.hand, &self.first.q);
         let n = self.hand.n_fingers();
         for j in 0..n {
-            let spot = self.surface.spot(j, self.hand.tip_radius(j));
+            let bounds = self.surface.bounds(j, &self.surface.spot(j, self.hand.tip_radius(j)), 0.0);
             for i in 0..self.hand.n_parts(j) {
                 let part = self.scratch.part(&self.hand, j, i);
-                let needed = 2.0 * CLEAR_OF_OBJECT * self.surface.size;
-                let bias = self.surface.clearance(j, &spot, &part, 0.0) - needed;
+                let needed = CLEAR_AT_FIRST * self.surface.size;
+                let bias = bounds.clearance(&part, needed) - needed;
                 self.clearance_bias[j][i] = bias.min(0.0);
                 self.parts[j][0][i] = part;
             }
@@ -341,16 +362,10 @@ impl Reserve {
         for j in 0..n {
             for k in (0..n).filter(|k| *k != j) {
                 let pairs = self.parts[j][0].iter().flat_map(|a| self.parts[k][0].iter().map(move |b| (a, b)));
-                let gap = pairs.map(|(a, b)| separation(a, b)).fold(f64::INFINITY, f64::min);
+                let gap = pairs.map(|(a, b)| separation(a, b, needed)).fold(f64::INFINITY, f64::min);
                 self.gap_bias[j][k] = (gap - needed).min(0.0);
             }
         }
         self.march = None;
     }
-}
-
-/// True where two parts are closer than `distance`.
-fn closer(a: &Part, b: &Part, distance: f64) -> bool {
-    let apart = (a.centre() - b.centre()).norm() - a.reach() - b.reach();
-    apart < distance && separation(a, b) < distance
 }

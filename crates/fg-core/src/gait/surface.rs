@@ -12,9 +12,8 @@ use nalgebra::{Rotation3, Unit, Vector3, Vector6};
 const ACROSS: f64 = 0.3;
 /// A translation of the contacts that is this many times their turn is no turn.
 const TRANSLATES: f64 = 10.0;
-/// Tangent planes each way about the axis, and radians between two of them: up to 75 degrees.
-const FAN: i32 = 5;
-const FAN_STEP: f64 = 0.2618;
+/// Cosine of how far round the axis from its contact the surface is taken to bend alike: 75 degrees.
+const AROUND: f64 = 0.2588;
 /// Share of the variance of the normals along the axis that a ball must explain.
 const BALL: f64 = 0.8;
 
@@ -156,25 +155,85 @@ impl Surface {
         spot.p_W = tip + spot.n_W * tip_radius;
     }
 
-    /// How far `part` of finger `j`, which touches at `spot`, stays clear of the object after `t` seconds of its motion, m: a
-    /// lower bound for a convex object.
-    pub fn clearance(&self, j: usize, spot: &Spot, part: &Part, t: f64) -> f64 {
-        let moved = linear(&self.V) * t;
-        let mut best = part.from_plane(&spot.p_W, &spot.n_W);
+    /// What is known to bound the object, after `t` seconds of its motion, from where finger `j` touches at `spot`.
+    pub fn bounds(&self, j: usize, spot: &Spot, t: f64) -> Bounds {
+        let mut bounds = Bounds { n: 1, planes: [(spot.p_W, spot.n_W); MOST_PLANES], round: None, ball: None };
         if let (Some(axis), Some((centre, _))) = (self.axis, spot.circle) {
-            for k in (-FAN..=FAN).filter(|k| *k != 0) {
-                let turn = Rotation3::from_axis_angle(&axis, f64::from(k) * FAN_STEP);
-                let p = centre + turn * (spot.p_W - centre);
-                best = best.max(part.from_plane(&p, &(turn * spot.n_W)));
-            }
+            let axis = axis.into_inner();
+            let along = axis * axis.dot(&spot.n_W);
+            let share = (1.0 - along.norm_squared()).max(0.0).sqrt();
+            let out = (along - spot.n_W) / share.max(1e-9);
+            let centre = centre + axis * axis.dot(&(spot.p_W - centre));
+            bounds.round = Some(Round { axis, centre, radius: out.dot(&(spot.p_W - centre)), along, share, out });
         }
         if let Some((centre, radius)) = self.ball {
-            best = best.max(part.from_point(&(centre + self.velocity(&centre, 0.0) * t)) - radius);
+            bounds.ball = Some((centre + self.velocity(&centre, 0.0) * t, radius));
         }
         let turn = Rotation3::new(angular(&self.V) * t);
+        let origin = self.origin + linear(&self.V) * t;
         for k in (0..self.n).filter(|k| *k != j) {
-            let p = self.origin + moved + turn * (self.points[k] - self.origin);
-            best = best.max(part.from_plane(&p, &(turn * self.normals[k])));
+            bounds.add(origin + turn * (self.points[k] - self.origin), turn * self.normals[k]);
+        }
+        bounds
+    }
+}
+
+/// The most planes that bound an object: one at each contact.
+const MOST_PLANES: usize = HandModel::MAX_FINGERS;
+
+/// A surface of revolution about an axis: where it is touched, `radius` from the axis in the direction `out`, its normal has the
+/// part `along` along the axis and one of length `share` across it.
+#[derive(Debug, Clone, Copy)]
+struct Round {
+    axis: Vector3<f64>,
+    centre: Vector3<f64>,
+    radius: f64,
+    along: Vector3<f64>,
+    share: f64,
+    out: Vector3<f64>,
+}
+
+impl Round {
+    /// Distance of `part` from the tangent plane that faces it, m; None where that is too far round from the contact.
+    fn clearance(&self, part: &Part) -> Option<f64> {
+        let on_axis = |p: &Vector3<f64>| self.centre + self.axis * self.axis.dot(&(p - self.centre));
+        let mut nearest = part.nearest(&on_axis(part.centre()));
+        nearest = part.nearest(&on_axis(&nearest));
+        let out = (nearest - on_axis(&nearest)).try_normalize(1e-9)?;
+        (out.dot(&self.out) > AROUND)
+            .then(|| part.from_plane(&(self.centre + out * self.radius), &(self.along - out * self.share)))
+    }
+}
+
+/// What bounds a convex object: it lies behind planes, in a surface of revolution, and in a ball where one is known.
+#[derive(Debug, Clone, Copy)]
+pub struct Bounds {
+    n: usize,
+    planes: [(Vector3<f64>, Vector3<f64>); MOST_PLANES],
+    round: Option<Round>,
+    ball: Option<(Vector3<f64>, f64)>,
+}
+
+impl Bounds {
+    fn add(&mut self, p_W: Vector3<f64>, n_W: Vector3<f64>) {
+        self.planes[self.n] = (p_W, n_W);
+        self.n += 1;
+    }
+
+    /// A lower bound of the distance of `part` from the object, m; no more than `enough` is looked for.
+    pub fn clearance(&self, part: &Part, enough: f64) -> f64 {
+        let mut best = f64::NEG_INFINITY;
+        if let Some((centre, radius)) = &self.ball {
+            best = part.from_point(centre) - radius;
+        }
+        if let Some(clear) = self.round.as_ref().filter(|_| best < enough).and_then(|round| round.clearance(part)) {
+            best = best.max(clear);
+        }
+        for (p_W, n_W) in &self.planes[..self.n] {
+            if best > enough {
+                break;
+            }
+            best = best.max(part.from_plane(p_W, n_W));
         }
         best
     }

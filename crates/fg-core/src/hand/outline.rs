@@ -117,33 +117,55 @@ impl Part {
         -n.dot(&(self.centre - p)) - self.extent(n)
     }
 
-    /// Distance from the point `p`, m; minus the radius of the edges inside the box.
-    pub fn from_point(&self, p: &Vector3<f64>) -> f64 {
+    /// The point of its box that is nearest to `p`, m.
+    pub fn nearest(&self, p: &Vector3<f64>) -> Vector3<f64> {
         let offset = p - self.centre;
-        let mut nearest = Vector3::zeros();
+        let mut nearest = self.centre;
         for axis in self.axes.column_iter() {
             let square = axis.norm_squared();
             if square > 0.0 {
                 nearest += axis * (offset.dot(&axis) / square).clamp(-1.0, 1.0);
             }
         }
-        (offset - nearest).norm() - self.radius
+        nearest
+    }
+
+    /// Distance from the point `p`, m; minus the radius of the edges inside the box.
+    pub fn from_point(&self, p: &Vector3<f64>) -> f64 {
+        (p - self.nearest(p)).norm() - self.radius
     }
 }
 
 /// A lower bound of the distance between two parts, m: the largest gap along the normals of their faces, the products of
-/// their edges and the line between their centres. Exact where a face is nearest, and for balls.
-pub fn separation(a: &Part, b: &Part) -> f64 {
+/// their edges and the line between their centres. Exact where a face is nearest, and for balls. No more than `enough` is
+/// looked for.
+pub fn separation(a: &Part, b: &Part, enough: f64) -> f64 {
     let between = b.centre - a.centre;
+    let distance = between.norm();
+    let mut best = distance - a.reach - b.reach;
+    if best > enough {
+        return best;
+    }
     let gap = |n: &Vector3<f64>| {
-        n.try_normalize(1e-12).map_or(f64::NEG_INFINITY, |n| n.dot(&between).abs() - a.extent(&n) - b.extent(&n))
+        let square = n.norm_squared();
+        if square < 1e-24 {
+            return f64::NEG_INFINITY;
+        }
+        let n = n / square.sqrt();
+        n.dot(&between).abs() - a.extent(&n) - b.extent(&n)
     };
-    let mut best = gap(&between);
+    best = best.max(gap(&between));
     for axis in a.axes.column_iter().chain(b.axes.column_iter()) {
+        if best > enough {
+            return best;
+        }
         best = best.max(gap(&axis.into_owned()));
     }
     for u in a.axes.column_iter() {
         for v in b.axes.column_iter() {
+            if best > enough {
+                return best;
+            }
             best = best.max(gap(&u.cross(&v)));
         }
     }
