@@ -34,7 +34,11 @@ impl DualStagePlanner {
         let free = self.supervisor.free_finger();
         self.reserve.update(&scene, &self.V_asked, free);
         let (reserve, size) = (&self.reserve, self.reserve.size().max(1e-6));
-        let gone = |j| if reserve.turns() { reserve.gone(j, &scene) / size } else { 0.0 };
+        let lead = self.config.gait.lead * self.schedule.round_time();
+        let gone = |j| {
+            let way = reserve.gone(j, &scene) - reserve.goal(j, lead, &scene);
+            if reserve.turns() { way / size } else { 0.0 }
+        };
         self.schedule.update(|j| reserve.seconds(j), gone, free);
     }
 
@@ -51,9 +55,9 @@ impl DualStagePlanner {
         let silent = |j: &usize| self.guard.silent(*j) && self.reserve.link_near(*j, &scene);
         let free = self.supervisor.free_finger();
         let lying = (0..self.hand.n_fingers()).filter(|_| free.is_none()).find(silent);
-        if let Some(k) = lying.or(vain) {
+        let goes = lying.or(vain).is_some_and(|k| self.supervisor.retreat(k));
+        if goes {
             self.beyond = 0.0;
-            self.supervisor.retreat(k);
             self.planner.reset();
             self.velocity_force.reset(0.0);
         }
@@ -77,6 +81,10 @@ impl DualStagePlanner {
             }
             if let Some(k) = self.schedule.choice(|j| self.reserve.seconds(j)) {
                 let scene = scene!(self, measurement);
+                if !self.reserve.way_clear(k, &scene) {
+                    self.schedule.answer(k, f64::INFINITY);
+                    return;
+                }
                 let lead = self.config.gait.lead * self.schedule.round_time();
                 self.beyond = self.reserve.goal(k, lead, &scene);
                 self.schedule.start(k);

@@ -18,12 +18,12 @@ const AT_ONCE: usize = 1;
 /// One march in this many goes back.
 const BACK: usize = 4;
 /// Least distances of links from the object and from other fingers, by the contacts' radius.
-const CLEAR_OF_OBJECT: f64 = 0.015;
+const CLEAR_OF_OBJECT: f64 = 0.03;
 const CLEAR_OF_FINGERS: f64 = 0.06;
 /// What a grasp search leaves free between links and the object at the first grasp, by the contacts' radius.
 const CLEAR_AT_FIRST: f64 = 0.06;
 /// A link that is nearer may be what touches, by the contacts' radius.
-const AT_OBJECT: f64 = 0.06;
+const AT_OBJECT: f64 = 0.03;
 /// Rate of the filter on the desired twist, rad/s: a swing passes, the turn that is coming stays.
 const TURN: f64 = 1.5;
 /// Contacts that move by less than this share of their radius in a second stand.
@@ -59,6 +59,8 @@ pub struct Reserve {
     dt: f64,
     /// Kinematics of the finger that is on its march.
     scratch: HandState,
+    /// And of one that is looked at aside.
+    aside: HandState,
     surface: Surface,
     /// Desired twist behind two low passes.
     V: [Vector6<f64>; 2],
@@ -90,6 +92,7 @@ impl Reserve {
         Self {
             dt,
             scratch: HandState::new(hand),
+            aside: HandState::new(hand),
             surface: Surface::new(),
             V: [Vector6::zeros(); 2],
             first: First { q: vec![0.0; hand.n_q()], contacts: Vec::with_capacity(n), origin: Vector3::zeros() },
@@ -193,7 +196,8 @@ impl Reserve {
         let speed = self.velocity(j, scene).norm();
         let back = self.back[j].seconds;
         let farthest = if back.is_nan() { 0.0 } else { self.gone(j, scene) - back * speed };
-        farthest.max(-0.5 * lead * speed)
+        // Home itself has been reached before.
+        farthest.max(-0.5 * lead * speed).min(0.0)
     }
 
     /// Velocity of the object at the contact of finger `j` in the motion that is coming, m/s.
@@ -329,6 +333,30 @@ impl Reserve {
             }
         }
         None
+    }
+
+    /// True where nothing of another finger, as it is now, is in the way of finger `j` to its home: at home, and at two places
+    /// between.
+    pub fn way_clear(&mut self, j: usize, scene: &Scene<'_>) -> bool {
+        let joints = self.hand.joints(j);
+        let mut q = [0.0; HandModel::MAX_JOINTS];
+        for share in [1.0 / 3.0, 2.0 / 3.0, 1.0] {
+            for (i, at) in joints.clone().enumerate() {
+                q[i] = scene.q[at] + share * (self.first.q[at] - scene.q[at]);
+            }
+            self.aside.update_finger(&self.hand, j, &q[..joints.len()]);
+            for i in 0..self.hand.n_parts(j) {
+                let part = self.aside.part(&self.hand, j, i);
+                for k in (0..self.hand.n_fingers()).filter(|k| *k != j) {
+                    let needed = CLEAR_OF_FINGERS * self.surface.size + self.gap_bias[j][k];
+                    let near = |l| separation(&part, &scene.state.part(&self.hand, k, l), needed) < needed;
+                    if (0..self.hand.n_parts(k)).any(near) {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
     }
 
     /// True where a link of finger `j` is at the object or next to it, as far as its outline tells.

@@ -103,7 +103,10 @@ impl Schedule {
         }
         let mut sorted = [f64::INFINITY; HandModel::MAX_FINGERS];
         for (j, T) in sorted[..n].iter_mut().enumerate().filter(|(j, _)| Some(*j) != free) {
-            *T = seconds(j);
+            // A finger with little reserve at home is no reason to hurry: no gait gives it more.
+            let known = seconds(j);
+            let helps = known > self.gait_time || gone(j) > 0.5 * WORTH;
+            *T = if helps { known } else { f64::INFINITY };
         }
         sorted[..n].sort_by(f64::total_cmp);
         // The finger that is on its way now is not back yet.

@@ -60,6 +60,8 @@ const LOST_AFTER: f64 = 0.03;
 const GIVE_UP_AFTER: f64 = 0.15;
 /// Time for which a finger looks for the object before it goes home for it, s.
 const SEEKS: f64 = 0.3;
+/// Least time between two retreats, s.
+const RETREATS_EVERY: f64 = 2.0;
 /// Time that all fingers must touch before the grasp counts as static, s.
 const STATIC_AFTER: f64 = 0.02;
 /// Time after which refused fingers are asked again, s.
@@ -76,6 +78,8 @@ pub struct Supervisor {
     homing: bool,
     /// It does so off the object.
     lifted: bool,
+    /// Time since it last did, s.
+    since_retreat: f64,
     /// Time in the present phase, s.
     elapsed: f64,
     /// Time in which all fingers have been in contact without a break, s.
@@ -106,6 +110,7 @@ impl Supervisor {
             free: 0,
             homing: false,
             lifted: false,
+            since_retreat: f64::INFINITY,
             elapsed: 0.0,
             touching: 0.0,
             off: vec![0.0; n],
@@ -126,6 +131,7 @@ impl Supervisor {
         self.touching = 0.0;
         self.off.fill(0.0);
         self.threshold = None;
+        self.since_retreat = f64::INFINITY;
         self.refused.fill(false);
         self.since_refusal = 0.0;
         self.waiting = 0.0;
@@ -191,6 +197,7 @@ impl Supervisor {
     pub fn observe(&mut self, grasp: &Grasp) -> bool {
         self.elapsed += self.dt;
         self.since_refusal += self.dt;
+        self.since_retreat += self.dt;
         if self.since_refusal > ASK_AGAIN_AFTER {
             self.refused.fill(false);
         }
@@ -262,13 +269,19 @@ impl Supervisor {
         self.enter(Phase::Unload);
     }
 
-    /// Takes finger `k` off the object and home, whatever the others can do: it holds nothing with its tip.
-    pub fn retreat(&mut self, k: usize) {
+    /// Takes finger `k` off the object and home, whatever the others can do: it holds nothing with its tip. Not again right
+    /// after the last time; false where it does not.
+    pub fn retreat(&mut self, k: usize) -> bool {
+        if self.since_retreat < RETREATS_EVERY {
+            return false;
+        }
+        self.since_retreat = 0.0;
         self.free = k;
         self.homing = true;
         self.lifted = true;
         self.gaits += 1;
         self.enter(Phase::Slide);
+        true
     }
 
     /// Remembers that the other fingers cannot hold without finger `k`.

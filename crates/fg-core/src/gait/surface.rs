@@ -22,10 +22,10 @@ const BALL: f64 = 0.8;
 pub struct Surface {
     n: usize,
     /// Twist of the object in W, and its origin.
-    pub V: Vector6<f64>,
-    pub origin: Vector3<f64>,
+    V: Vector6<f64>,
+    origin: Vector3<f64>,
     /// Direction of the axis of the motion; None where it does not turn.
-    pub axis: Option<Unit<Vector3<f64>>>,
+    axis: Option<Unit<Vector3<f64>>>,
     /// Mean distance of the contacts from their mean, m: the length by which everything else is measured.
     pub size: f64,
     /// Radius of the surface about the axis, m.
@@ -39,8 +39,9 @@ pub struct Surface {
 /// The contact of one finger on its way along the motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Spot {
+    /// Place in W, m.
     pub p_W: Vector3<f64>,
-    /// Into the object.
+    /// Normal into the object in W.
     pub n_W: Vector3<f64>,
     /// The finger's own way round: centre of the circle on which the tip's centre runs about the axis, and its radius; None
     /// where the surface is flat.
@@ -50,6 +51,7 @@ pub struct Spot {
 }
 
 impl Surface {
+    /// A surface of which nothing is known.
     pub fn new() -> Self {
         let zeros = [Vector3::zeros(); HandModel::MAX_FINGERS];
         Self {
