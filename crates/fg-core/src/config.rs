@@ -153,7 +153,7 @@ impl Default for GaitConfig {
             enabled: true,
             event: GaitEvent::Quality,
             govern: true,
-            lead: 0.0,
+            lead: 1.0,
             w1: 0.99,
             w2: 0.02,
             w_z: 8.0,

@@ -4,8 +4,8 @@ use crate::config::Config;
 use crate::diagnostics::Diagnostics;
 use crate::error::Error;
 use crate::friction::FrictionPyramid;
-use crate::gait::planner::{GaitPlanner, GaitRate};
 use crate::gait::governor::Governor;
+use crate::gait::planner::{GaitPlanner, GaitRate};
 use crate::gait::quality::QualityModel;
 use crate::gait::reserve::Reserve;
 use crate::gait::schedule::Schedule;
@@ -24,6 +24,9 @@ use crate::safety::steady::SteadyWrench;
 use crate::signals::{Command, Measurement, Reference};
 use crate::spatial::{angular, linear};
 use nalgebra::{DMatrix, DVector, Vector6};
+
+/// Normal force of a finger that nothing else is asked of, by that of one that slides, where reserves start gaits.
+const FLOOR: f64 = 2.0;
 
 /// The present scene; a macro, so that only the fields it reads are borrowed.
 macro_rules! scene {
@@ -348,10 +351,17 @@ impl DualStagePlanner {
 
     /// Eq. (8), with the free finger's force ramped or taken out.
     fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
+        let reserves = self.by_reserve();
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
             let holds = self.guard.drives(j) && !self.guard.damps(j);
             *limit = if holds { self.supervisor.force_limit(j, self.config.force.f_n_max) } else { 0.0 };
-            self.f_prev[3 * j + 2] += self.guard.squeeze();
+            let f_n = &mut self.f_prev[3 * j + 2];
+            *f_n += self.guard.squeeze();
+            // A finger that holds nothing loses the surface again and again, and no gait can begin meanwhile. Half of f_prev is
+            // what the optimum has where nothing else is asked.
+            if reserves && *limit >= self.config.force.f_n_max {
+                *f_n = f_n.max(2.0 * FLOOR * self.config.gait.f_des);
+            }
         }
         let scale = self.wrench_scale();
         let F = F_des.component_mul(&scale);

@@ -67,11 +67,18 @@ fn planar(scale: f64) -> HandModel {
 /// Any box, with its corner points.
 fn any_box(random: &mut Random, centre: Vector3<f64>) -> (Part, Vec<Vector3<f64>>) {
     let turn = UnitQuaternion::from_scaled_axis(random.vector(2.0));
-    let half = Vector3::new(random.uniform(0.002, 0.02), random.uniform(0.002, 0.02), random.uniform(0.002, 0.02));
+    let half =
+        Vector3::new(random.uniform(0.002, 0.02), random.uniform(0.002, 0.02), random.uniform(0.002, 0.02));
     // A finger that is at `turn` where its joints are at zero is a way to a box in W that every user has.
     let q = turn.into_inner().coords;
     let joint = Joint { position: centre.into(), quaternion: [q.w, q.x, q.y, q.z], ..Joint::default() };
-    let block = Block { joint: 0, position: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0], half: half.into(), radius: 0.0 };
+    let block = Block {
+        joint: 0,
+        position: [0.0; 3],
+        quaternion: [1.0, 0.0, 0.0, 0.0],
+        half: half.into(),
+        radius: 0.0,
+    };
     let finger = Finger {
         name: "f".into(),
         joints: vec![joint],

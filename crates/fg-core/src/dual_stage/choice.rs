@@ -12,7 +12,7 @@ const HOME: f64 = 0.03;
 
 impl DualStagePlanner {
     /// True where the fingers' reserves start gaits.
-    fn by_reserve(&self) -> bool {
+    pub(super) fn by_reserve(&self) -> bool {
         self.config.gait.enabled && self.config.gait.event != GaitEvent::Quality
     }
 
@@ -37,7 +37,11 @@ impl DualStagePlanner {
         let lead = self.config.gait.lead * self.schedule.round_time();
         let gone = |j| {
             let way = reserve.gone(j, &scene) - reserve.goal(j, lead, &scene);
-            if reserve.turns() { way / size } else { 0.0 }
+            if reserve.turns() {
+                way / size
+            } else {
+                0.0
+            }
         };
         self.schedule.update(|j| reserve.seconds(j), gone, free);
     }

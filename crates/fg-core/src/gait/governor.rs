@@ -125,7 +125,13 @@ mod tests {
     }
 
     /// Turns for `seconds` from `t`, checks that pose and twist agree, and returns the angle gained.
-    fn run(governor: &mut Governor, t: &mut f64, seconds: f64, slack: f64, waiting: impl Fn(f64) -> f64) -> f64 {
+    fn run(
+        governor: &mut Governor,
+        t: &mut f64,
+        seconds: f64,
+        slack: f64,
+        waiting: impl Fn(f64) -> f64,
+    ) -> f64 {
         let (begin, mut gained) = (*t, 0.0);
         let mut last: Option<Reference> = None;
         while *t < begin + seconds {

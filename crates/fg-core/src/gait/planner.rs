@@ -109,7 +109,8 @@ impl GaitPlanner {
         let fastest = self.c[..n].iter().fold(1e-9, |most: f64, c| most.max(c.abs()));
         // Half of what (4d) allows: the surface, which moves under the finger, wants some too.
         let brake = 0.5 * self.sigma / self.dt / fastest;
-        let speed = (self.config.qd_max / fastest).min((2.0 * brake * distance).sqrt()).min(distance / SETTLE);
+        let speed =
+            (self.config.qd_max / fastest).min((2.0 * brake * distance).sqrt()).min(distance / SETTLE);
         // Three joints or fewer have nothing to spare.
         if n > 3 {
             for ((x, first), at) in x.iter_mut().zip(first).zip(scene.state.joints(k)) {

@@ -95,7 +95,11 @@ impl Reserve {
             aside: HandState::new(hand),
             surface: Surface::new(),
             V: [Vector6::zeros(); 2],
-            first: First { q: vec![0.0; hand.n_q()], contacts: Vec::with_capacity(n), origin: Vector3::zeros() },
+            first: First {
+                q: vec![0.0; hand.n_q()],
+                contacts: Vec::with_capacity(n),
+                origin: Vector3::zeros(),
+            },
             known: false,
             begun: false,
             calibrated: None,
@@ -389,7 +393,8 @@ impl Reserve {
         let needed = 2.0 * CLEAR_OF_FINGERS * self.surface.size;
         for j in 0..n {
             for k in (0..n).filter(|k| *k != j) {
-                let pairs = self.parts[j][0].iter().flat_map(|a| self.parts[k][0].iter().map(move |b| (a, b)));
+                let pairs =
+                    self.parts[j][0].iter().flat_map(|a| self.parts[k][0].iter().map(move |b| (a, b)));
                 let gap = pairs.map(|(a, b)| separation(a, b, needed)).fold(f64::INFINITY, f64::min);
                 self.gap_bias[j][k] = (gap - needed).min(0.0);
             }

@@ -96,7 +96,12 @@ impl Schedule {
 
     /// Takes note of the fingers' reserves, s, and of how far they have gone, in contact radii; `free` is the finger whose gait
     /// is under way.
-    pub fn update(&mut self, seconds: impl Fn(usize) -> f64, gone: impl Fn(usize) -> f64, free: Option<usize>) {
+    pub fn update(
+        &mut self,
+        seconds: impl Fn(usize) -> f64,
+        gone: impl Fn(usize) -> f64,
+        free: Option<usize>,
+    ) {
         let n = self.candidates.len();
         for candidate in &mut self.candidates {
             candidate.age += self.dt;
@@ -112,7 +117,8 @@ impl Schedule {
         // The finger that is on its way now is not back yet.
         let busy = self.running.map_or(0.0, |time| (self.gait_time - time).max(0.0));
         let slack = |(k, T): (usize, &f64)| T - k as f64 * self.gait_time - busy;
-        self.slack = sorted[..n].iter().enumerate().map(slack).fold(f64::INFINITY, f64::min) - self.unload_time;
+        self.slack =
+            sorted[..n].iter().enumerate().map(slack).fold(f64::INFINITY, f64::min) - self.unload_time;
         if !self.in_round() && self.slack < LEAD {
             for (j, candidate) in self.candidates.iter_mut().enumerate() {
                 candidate.due = Some(j) != free && gone(j) > WORTH;
@@ -130,9 +136,9 @@ impl Schedule {
     /// The finger of which it must be known next whether the others can hold without it.
     pub fn asks(&self) -> Option<usize> {
         let stale = |j: &usize| self.candidates[*j].due && self.candidates[*j].age > FRESH;
-        (0..self.candidates.len()).filter(stale).max_by(|a, b| {
-            self.candidates[*a].age.total_cmp(&self.candidates[*b].age)
-        })
+        (0..self.candidates.len())
+            .filter(stale)
+            .max_by(|a, b| self.candidates[*a].age.total_cmp(&self.candidates[*b].age))
     }
 
     /// Takes note of what the others fail to deliver without finger `j`, by what a gait allows.
@@ -152,7 +158,8 @@ impl Schedule {
             .filter(|j| able(j) && seconds(*j) < self.gait_time + self.unload_time)
             .min_by(|a, b| seconds(*a).total_cmp(&seconds(*b)));
         let hardest = || {
-            let by_load = |a: &usize, b: &usize| self.candidates[*a].load.total_cmp(&self.candidates[*b].load);
+            let by_load =
+                |a: &usize, b: &usize| self.candidates[*a].load.total_cmp(&self.candidates[*b].load);
             (0..self.candidates.len()).filter(able).max_by(by_load)
         };
         urgent.or_else(hardest)

@@ -159,14 +159,16 @@ impl Surface {
 
     /// What is known to bound the object, after `t` seconds of its motion, from where finger `j` touches at `spot`.
     pub fn bounds(&self, j: usize, spot: &Spot, t: f64) -> Bounds {
-        let mut bounds = Bounds { n: 1, planes: [(spot.p_W, spot.n_W); MOST_PLANES], round: None, ball: None };
+        let mut bounds =
+            Bounds { n: 1, planes: [(spot.p_W, spot.n_W); MOST_PLANES], round: None, ball: None };
         if let (Some(axis), Some((centre, _))) = (self.axis, spot.circle) {
             let axis = axis.into_inner();
             let along = axis * axis.dot(&spot.n_W);
             let share = (1.0 - along.norm_squared()).max(0.0).sqrt();
             let out = (along - spot.n_W) / share.max(1e-9);
             let centre = centre + axis * axis.dot(&(spot.p_W - centre));
-            bounds.round = Some(Round { axis, centre, radius: out.dot(&(spot.p_W - centre)), along, share, out });
+            bounds.round =
+                Some(Round { axis, centre, radius: out.dot(&(spot.p_W - centre)), along, share, out });
         }
         if let Some((centre, radius)) = self.ball {
             bounds.ball = Some((centre + self.velocity(&centre, 0.0) * t, radius));
@@ -228,7 +230,9 @@ impl Bounds {
         if let Some((centre, radius)) = &self.ball {
             best = part.from_point(centre) - radius;
         }
-        if let Some(clear) = self.round.as_ref().filter(|_| best < enough).and_then(|round| round.clearance(part)) {
+        if let Some(clear) =
+            self.round.as_ref().filter(|_| best < enough).and_then(|round| round.clearance(part))
+        {
             best = best.max(clear);
         }
         for (p_W, n_W) in &self.planes[..self.n] {

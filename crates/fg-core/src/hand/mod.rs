@@ -5,8 +5,8 @@
 //! kinematics, and none in the arrays.
 
 mod inertia;
-mod layout;
 mod inverse;
+mod layout;
 mod limits;
 mod outline;
 mod state;
