@@ -9,6 +9,9 @@ use crate::manipulation::force::{ForceStatus, SolverCounters, SolverUsed};
 use crate::safety::{Faults, SafeMode};
 use nalgebra::{DVector, Vector6};
 
+/// Times beyond this are not told apart in the diagnostics, s.
+pub const FAR: f64 = 100.0;
+
 /// The figures of one control step. Allocated once, overwritten by each step; holds no time measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostics {
@@ -59,11 +62,11 @@ pub struct Diagnostics {
     /// Answers of each solver since the start, and how often and why one passed the QP on to the next. Not in the log,
     /// which has each step's solver and residual.
     pub solver_counts: SolverCounters,
-    /// For how long each finger can follow the desired motion, s; infinite where it does not turn, or where that is not known.
+    /// For how long each finger can follow the desired motion, s; [`FAR`] where it does not turn, or where that is not known.
     pub reserve: DVector<f64>,
     /// What ended each finger's last march along the motion.
     pub reserve_end: Vec<MarchEnd>,
-    /// Slack of the schedule of gaits, s.
+    /// Slack of the schedule of gaits, s, at most [`FAR`].
     pub slack: f64,
     /// Share of its rate at which the desired motion goes on.
     pub pace: f64,
@@ -105,9 +108,9 @@ impl Diagnostics {
             kkt: 0.0,
             iterations: 0,
             solver_counts: SolverCounters::default(),
-            reserve: DVector::from_element(n_fingers, f64::INFINITY),
+            reserve: DVector::from_element(n_fingers, FAR),
             reserve_end: vec![MarchEnd::Open; n_fingers],
-            slack: f64::INFINITY,
+            slack: FAR,
             pace: 1.0,
             lag: Vector6::zeros(),
             friction: 0.0,

@@ -10,7 +10,7 @@ mod instances;
 mod recording;
 
 use counting::allocations;
-use fg_core::config::Config;
+use fg_core::config::{Config, GaitEvent};
 use fg_core::dual_stage::DualStagePlanner;
 use fg_core::hand::{Finger, Follows, HandModel, HandState};
 use fg_core::manipulation::force::{ForceStatus, SolverUsed};
@@ -173,6 +173,34 @@ fn gaits_run_on_hands_with_few_and_many_joints() {
 }
 
 #[test]
+fn reserves_of_any_hand_are_times_and_start_gaits_home() {
+    let (mut gaits, mut known) = (0, 0);
+    for seed in 0..12 {
+        let mut random = Random(seed);
+        let (hand, ..) = hand(&mut random);
+        let mut config = Config { mass: Some(0.01), ..Config::default() };
+        config.force.tau_max = Some(1.0);
+        config.gait.event = GaitEvent::Reserve;
+        (config.gait.slack_force, config.gait.slack_torque) = (1e3, 1e3);
+        let mut planner = DualStagePlanner::new(hand.clone(), RECORDING.controller.clone(), config).unwrap();
+        let mut tau = nalgebra::DVector::zeros(hand.n_q());
+        for (mut measurement, reference) in hands::rows(&mut random, &hand, 2000) {
+            measurement.tau.copy_from(&tau);
+            let ((), count) = allocations(|| {
+                tau.copy_from(&planner.step(&measurement, &reference).unwrap().tau);
+            });
+            let d = planner.diagnostics();
+            assert!(count == 0 || d.solver != SolverUsed::ActiveSet, "{count} allocations");
+            assert!(tau.iter().all(|tau| tau.is_finite()) && d.reserve.iter().all(|time| *time >= 0.0));
+            assert!(d.pace.abs() < 1.3 && d.lag.iter().all(|lag| lag.is_finite()) && !d.slack.is_nan());
+            known += usize::from(d.reserve.iter().any(|time| time.is_finite()));
+        }
+        gaits += planner.diagnostics().gaits;
+    }
+    assert!(known > 4000 && gaits > 0, "{known} steps, {gaits} gaits");
+}
+
+#[test]
 fn the_weight_of_the_object_is_held_against_the_hands_gravity() {
     let (mut fingers, _) = hands::any(&mut Random(5));
     for joint in fingers.iter_mut().flat_map(|finger| &mut finger.joints) {
@@ -198,6 +226,7 @@ fn bad_fields_are_named() {
         fingers.truncate(2);
         for finger in &mut fingers {
             finger.joints.truncate(3);
+            finger.outline.clear();
             for joint in &mut finger.joints {
                 joint.follows = None;
                 (joint.tau_min, joint.tau_max) = (Some(-1.0), Some(1.0));

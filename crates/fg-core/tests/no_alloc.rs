@@ -7,6 +7,7 @@ mod counting;
 mod recording;
 
 use counting::allocations;
+use fg_core::config::{Config, GaitEvent};
 use fg_core::manipulation::force::SolverUsed;
 use fg_core::safety::SafeMode;
 use recording::{Recording, NOISY, ROTATE};
@@ -17,8 +18,17 @@ fn replay(
     bytes: &[u8],
     spoil: impl Fn(usize, &mut fg_core::signals::Measurement, &mut fg_core::signals::Reference),
 ) -> (Vec<&'static str>, Vec<&'static str>) {
+    replay_with(bytes, |_| (), spoil)
+}
+
+/// The same with a configuration that is changed.
+fn replay_with(
+    bytes: &[u8],
+    change: impl FnOnce(&mut Config),
+    spoil: impl Fn(usize, &mut fg_core::signals::Measurement, &mut fg_core::signals::Reference),
+) -> (Vec<&'static str>, Vec<&'static str>) {
     let recording = Recording::parse(bytes);
-    let mut planner = recording.planner();
+    let mut planner = recording.planner_with(change);
     let (mut phases, mut modes) = (Vec::new(), Vec::new());
     let mut slow = 0;
     for (k, (measurement, reference)) in recording.rows.iter().enumerate() {
@@ -51,6 +61,12 @@ fn no_step_of_a_run_allocates_in_any_phase() {
         assert_eq!(phases, ["hold", "load", "press", "slide", "unload"]);
         assert_eq!(modes, [SafeMode::Normal.as_str()]);
     }
+}
+
+#[test]
+fn no_step_allocates_where_reserves_start_gaits() {
+    let (phases, _) = replay_with(ROTATE, |config| config.gait.event = GaitEvent::Both, |_, _, _| ());
+    assert!(phases.contains(&"slide"), "{phases:?}");
 }
 
 #[test]

@@ -21,7 +21,9 @@ impl DualStagePlanner {
         if !(self.by_reserve() && self.config.gait.govern) {
             return *reference;
         }
-        self.governor.update(self.schedule.slack(), self.schedule.waiting());
+        // A finger that is at its end and goes next is no reason to slow down: its unloading takes that long.
+        let slack = self.schedule.slack() + self.config.gait.unload_time;
+        self.governor.update(slack, self.schedule.waiting());
         self.governor.govern(reference)
     }
 

@@ -1,6 +1,7 @@
 //! What the control step says of itself.
 
 use super::DualStagePlanner;
+use crate::diagnostics::FAR;
 use crate::manipulation::force::ForceStatus;
 use crate::safety::guard::Outcome;
 use nalgebra::Vector6;
@@ -24,10 +25,10 @@ impl DualStagePlanner {
             d.slip[j] = self.slip.speed(j);
         }
         for j in 0..self.hand.n_fingers() {
-            d.reserve[j] = self.reserve.seconds(j);
+            d.reserve[j] = self.reserve.seconds(j).min(FAR);
             d.reserve_end[j] = self.reserve.reaches(j).0.end;
         }
-        d.slack = self.schedule.slack();
+        d.slack = self.schedule.slack().min(FAR);
         d.pace = self.governor.share();
         d.lag = *self.governor.lag();
         d.friction = self.friction.mu();

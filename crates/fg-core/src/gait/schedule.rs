@@ -119,9 +119,10 @@ impl Schedule {
         let slack = |(k, T): (usize, &f64)| T - k as f64 * self.gait_time - busy;
         self.slack =
             sorted[..n].iter().enumerate().map(slack).fold(f64::INFINITY, f64::min) - self.unload_time;
-        if !self.in_round() && self.slack < LEAD {
+        // A round that waits takes in fingers that are worth a gait by now: with them home another may be easier to spare.
+        if self.slack < LEAD && (!self.in_round() || self.waiting > FRESH) {
             for (j, candidate) in self.candidates.iter_mut().enumerate() {
-                candidate.due = Some(j) != free && gone(j) > WORTH;
+                candidate.due |= Some(j) != free && gone(j) > WORTH;
             }
         }
         match (&mut self.running, free) {
@@ -177,11 +178,5 @@ impl Schedule {
         if let Some(time) = self.running.take().filter(|_| !broken) {
             self.gait_time += LEARN * (time - self.gait_time);
         }
-    }
-
-    /// Ends the round: what is still due is judged anew.
-    pub fn give_up(&mut self) {
-        self.candidates.iter_mut().for_each(|candidate| candidate.due = false);
-        self.waiting = 0.0;
     }
 }

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "each user needs its own part")]
 
 use super::instances::Random;
-use fg_core::hand::{Finger, Follows, HandModel, HandState, Joint, Tip};
+use fg_core::hand::{Block, Finger, Follows, HandModel, HandState, Joint, Tip};
 use fg_core::signals::{Measurement, Reference, Tactile};
 use nalgebra::{Isometry3, Matrix4, Point3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3, Vector6};
 
@@ -43,7 +43,21 @@ fn finger(random: &mut Random, j: usize, n: usize, stated: bool) -> Finger {
         joints[i].follows = Some(Follows { joint: leader, ratio, offset });
     }
     let tip = Tip { position: random.vector(0.03).into(), radius: random.uniform(0.005, 0.02) };
-    Finger { name: format!("f{j}"), joints, tip, outline: Vec::new() }
+    let blocks = random.below(4);
+    let outline = (0..blocks).map(|_| block(random, joints.len())).collect();
+    Finger { name: format!("f{j}"), joints, tip, outline }
+}
+
+fn block(random: &mut Random, joints: usize) -> Block {
+    let turn = UnitQuaternion::from_scaled_axis(random.vector(1.5));
+    let Quaternion { coords } = turn.into_inner();
+    Block {
+        joint: random.below(joints),
+        position: random.vector(0.02).into(),
+        quaternion: [coords.w, coords.x, coords.y, coords.z],
+        half: random.vector(0.01).abs().into(),
+        radius: random.uniform(0.0, 0.01),
+    }
 }
 
 fn joint(random: &mut Random, limited: bool) -> Joint {
