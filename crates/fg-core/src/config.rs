@@ -1,6 +1,7 @@
 //! Every parameter of the control step, once. `Default` is the paper's parameter list (Section V-B).
 
 use crate::error::Error;
+pub use crate::gait::schedule::GaitEvent;
 use crate::manipulation::force::SolverChoice;
 use crate::safety::config::SafetyConfig;
 use serde::{Deserialize, Serialize};
@@ -49,21 +50,10 @@ pub enum QualityPlane {
     Object,
 }
 
-/// What starts a gait.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GaitEvent {
-    /// The paper's: Q of the whole hand below delta_Q. The finger follows the gradient of Q.
-    Quality,
-    /// The fingers' reserves. The finger goes home.
-    Reserve,
-    /// Whichever comes first.
-    Both,
-}
-
 /// Parameters of the velocity-level gait planner, eqs. (1) to (5).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[allow(clippy::struct_excessive_bools, reason = "each turns one deviation from the paper off")]
 pub struct GaitConfig {
     /// False: all fingers always hold the object.
     pub enabled: bool,

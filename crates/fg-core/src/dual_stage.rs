@@ -22,7 +22,6 @@ use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
 use crate::safety::steady::SteadyWrench;
 use crate::signals::{Command, Measurement, Reference};
-use crate::spatial::{angular, linear};
 use nalgebra::{DMatrix, DVector, Vector6};
 
 /// Normal force of a finger that nothing else is asked of, by that of one that slides, where reserves start gaits.
@@ -304,18 +303,6 @@ impl DualStagePlanner {
             outcome = outcome.and(self.probe.set_pyramid(j, &self.pyramid));
         }
         debug_assert!(outcome.is_ok());
-    }
-
-    /// What the fingers fail to deliver, as a multiple of what a gait allows.
-    fn overload(&self, psi: &Vector6<f64>) -> f64 {
-        let gait = &self.config.gait;
-        (linear(psi).norm() / gait.slack_force).max(angular(psi).norm() / gait.slack_torque)
-    }
-
-    /// Weights of force and torque in Psi.
-    fn wrench_scale(&self) -> Vector6<f64> {
-        let w = 1.0 / self.config.force.torque_length;
-        Vector6::new(1.0, 1.0, 1.0, w, w, w)
     }
 
     /// Torques left for the contact forces, once the fingers' own weight and motion have had theirs.

@@ -164,6 +164,7 @@ fn travel(bandwidth: f64, scale: f64, weight: f64) -> f64 {
         name: name.into(),
         joints: vec![joint([0.0, 0.0, 1.0], 0.0), joint([0.0, 1.0, 0.0], 0.0), joint([0.0, 1.0, 0.0], 0.05)],
         tip: fg_core::hand::Tip { position: [0.045, 0.0, 0.0], radius: 0.014 },
+        outline: Vec::new(),
     };
     let hand = HandModel::new(vec![finger("a"), finger("b")], [0.0; 3]).unwrap();
     let mut config = Config::default();

@@ -5,6 +5,7 @@ use crate::config::GaitEvent;
 use crate::grasp::Scene;
 use crate::manipulation::force::ForceProblem;
 use crate::signals::{Measurement, Reference};
+use crate::spatial::{angular, linear};
 use nalgebra::Vector6;
 
 /// A finger has come home where it is as near as this share of the contacts' radius.
@@ -116,6 +117,18 @@ impl DualStagePlanner {
         } else {
             self.supervisor.refuse(k);
         }
+    }
+
+    /// What the fingers fail to deliver, as a multiple of what a gait allows.
+    pub(super) fn overload(&self, psi: &Vector6<f64>) -> f64 {
+        let gait = &self.config.gait;
+        (linear(psi).norm() / gait.slack_force).max(angular(psi).norm() / gait.slack_torque)
+    }
+
+    /// Weights of force and torque in Psi.
+    pub(super) fn wrench_scale(&self) -> Vector6<f64> {
+        let w = 1.0 / self.config.force.torque_length;
+        Vector6::new(1.0, 1.0, 1.0, w, w, w)
     }
 
     /// What the other fingers fail to deliver without finger `k`, as a multiple of what a gait allows.

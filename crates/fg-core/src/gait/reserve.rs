@@ -1,20 +1,20 @@
 //! Each finger's reserve: for how long it can follow the object's coming motion, and how far back it can go home.
 //!
 //! A finger is marched ([`March`]) along the desired twist, and against it, until a joint, its own links or another finger end
-//! it. A control step takes a few steps of one march, so that its time is bounded; each reach has an age.
+//! it. A control step takes one step of one march, so that its time is bounded; each reach has an age.
+
+mod home;
 
 use crate::gait::march::{March, MarchEnd};
 use crate::gait::surface::Surface;
 use crate::grasp::{Contact, Scene};
 use crate::hand::{separation, HandModel, HandState, Part};
-use crate::spatial::{angular, linear};
+use crate::spatial::angular;
 use nalgebra::{Vector3, Vector6};
 
 /// Steps of a march; the fastest contact moves by 1 / `PER_SIZE` of the contacts' radius in each.
 const STEPS: usize = 24;
 const PER_SIZE: f64 = 30.0;
-/// Steps taken in one control step.
-const AT_ONCE: usize = 1;
 /// One march in this many goes back.
 const BACK: usize = 4;
 /// Least distances of links from the object and from other fingers, by the contacts' radius.
@@ -177,43 +177,6 @@ impl Reserve {
         self.surface.size
     }
 
-    /// The vector from the contact of finger `j` to its home, where it was at the first grasp as seen from the object's origin,
-    /// in W; m.
-    pub fn way_home(&self, j: usize, scene: &Scene<'_>) -> Vector3<f64> {
-        let home = self.first.contacts[j].p_WC - self.first.origin + scene.X_WO.translation.vector;
-        home - scene.grasp.contact(j).p_WC
-    }
-
-    /// The way of finger `j` to the place that is `beyond` home, along the motion, m.
-    pub fn way(&self, j: usize, beyond: f64, scene: &Scene<'_>) -> Vector3<f64> {
-        self.way_home(j, scene) + self.direction(j, scene) * beyond
-    }
-
-    /// How far finger `j` has gone with the motion since it was at home, m; negative where it is behind.
-    pub fn gone(&self, j: usize, scene: &Scene<'_>) -> f64 {
-        -self.direction(j, scene).dot(&self.way_home(j, scene))
-    }
-
-    /// How far along the motion from home finger `j` should land, m: behind home by half of what it travels in `lead` seconds,
-    /// but not so far that its march against the motion ends before.
-    pub fn goal(&self, j: usize, lead: f64, scene: &Scene<'_>) -> f64 {
-        let speed = self.velocity(j, scene).norm();
-        let back = self.back[j].seconds;
-        let farthest = if back.is_nan() { 0.0 } else { self.gone(j, scene) - back * speed };
-        // Home itself has been reached before.
-        farthest.max(-0.5 * lead * speed).min(0.0)
-    }
-
-    /// Velocity of the object at the contact of finger `j` in the motion that is coming, m/s.
-    fn velocity(&self, j: usize, scene: &Scene<'_>) -> Vector3<f64> {
-        let arm = scene.grasp.contact(j).p_WC - scene.X_WO.translation.vector;
-        linear(&self.V[1]) + angular(&self.V[1]).cross(&arm)
-    }
-
-    fn direction(&self, j: usize, scene: &Scene<'_>) -> Vector3<f64> {
-        self.velocity(j, scene).try_normalize(1e-9).unwrap_or_else(Vector3::zeros)
-    }
-
     /// True where the object is about to turn, and reserves mean something.
     pub fn turns(&self) -> bool {
         self.known && self.surface.size > 0.0 && self.surface.speed() > STANDS * self.surface.size
@@ -253,9 +216,7 @@ impl Reserve {
             self.record(k, 0, scene.state);
             self.last[k] = 0;
         }
-        for _ in 0..AT_ONCE {
-            self.march_on(scene, free);
-        }
+        self.march_on(scene, free);
     }
 
     /// One step of the march under way, or the beginning of the next one.

@@ -7,6 +7,19 @@
 
 use crate::config::GaitConfig;
 use crate::hand::HandModel;
+use serde::{Deserialize, Serialize};
+
+/// What starts a gait.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GaitEvent {
+    /// The paper's: Q of the whole hand below delta_Q. The finger follows the gradient of Q.
+    Quality,
+    /// The fingers' reserves. The finger goes home.
+    Reserve,
+    /// Whichever comes first.
+    Both,
+}
 
 /// A round begins where the slack is below this, s.
 const LEAD: f64 = 0.5;

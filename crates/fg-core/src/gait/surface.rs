@@ -137,22 +137,19 @@ impl Surface {
 
     /// Moves `spot` on: the object has moved from time `t` on for `dt` seconds, and the tip's centre is now at `tip`.
     pub fn roll(&self, spot: &mut Spot, tip: &Vector3<f64>, tip_radius: f64, t: f64, dt: f64) {
-        match (self.axis, &mut spot.circle) {
-            (Some(axis), Some((centre, radius))) => {
-                *centre += self.velocity(centre, t) * dt;
-                let offset = tip - *centre;
-                let across = offset - axis.into_inner() * axis.dot(&offset);
-                let along = axis.into_inner() * axis.dot(&spot.n_W);
-                let share = (1.0 - along.norm_squared()).max(0.0).sqrt();
-                if let Some(out) = across.try_normalize(1e-9) {
-                    spot.n_W = along - out * share;
-                    spot.gap = (across.norm() - *radius) / share.max(ACROSS);
-                }
+        if let (Some(axis), Some((centre, radius))) = (self.axis, &mut spot.circle) {
+            *centre += self.velocity(centre, t) * dt;
+            let offset = tip - *centre;
+            let across = offset - axis.into_inner() * axis.dot(&offset);
+            let along = axis.into_inner() * axis.dot(&spot.n_W);
+            let share = (1.0 - along.norm_squared()).max(0.0).sqrt();
+            if let Some(out) = across.try_normalize(1e-9) {
+                spot.n_W = along - out * share;
+                spot.gap = (across.norm() - *radius) / share.max(ACROSS);
             }
-            _ => {
-                let moved = spot.p_W + self.velocity(&spot.p_W, t) * dt;
-                spot.gap = -spot.n_W.dot(&(tip + spot.n_W * tip_radius - moved));
-            }
+        } else {
+            let moved = spot.p_W + self.velocity(&spot.p_W, t) * dt;
+            spot.gap = -spot.n_W.dot(&(tip + spot.n_W * tip_radius - moved));
         }
         spot.p_W = tip + spot.n_W * tip_radius;
     }
