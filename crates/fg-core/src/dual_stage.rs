@@ -1,6 +1,7 @@
 //! The dual-stage planner: one control step from sensors to torques. The only file that knows the order.
 
 mod fallback;
+mod regrasping;
 mod report;
 
 use crate::config::Config;
@@ -17,6 +18,7 @@ use crate::manipulation::feedforward::damping_torque;
 use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, ForceStatus, SolverUsed};
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
+use crate::regrasp::Regrasp;
 use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
 use crate::safety::steady::SteadyWrench;
@@ -43,6 +45,7 @@ pub struct DualStagePlanner {
     pyramid: FrictionPyramid,
     planner: GaitPlanner,
     velocity_force: VelocityForceController,
+    regrasp: Regrasp,
     /// Contact forces of the last step in their contact frames, N.
     f_prev: DVector<f64>,
     /// Grasp map with its torque rows weighted, for the force optimiser.
@@ -121,7 +124,7 @@ impl DualStagePlanner {
             state: HandState::new(&hand),
             grasp: Grasp::new(&hand, config.gait.contact_force),
             quality: QualityModel::new(&hand, &config.gait),
-            supervisor: Supervisor::new(&hand, &config.gait, dt),
+            supervisor: Supervisor::new(&hand, &config.gaits(), dt),
             robust: RobustController::new(K, &config.robust, config.mass, &hand.gravity(), dt)?,
             forces: ForceOptimizer::new(&pyramids, n_q, settings.clone())?,
             probe: ForceOptimizer::new(&pyramids, n_q, settings)?,
@@ -130,6 +133,7 @@ impl DualStagePlanner {
             pyramid,
             planner: GaitPlanner::new(&hand, &config.gait, dt),
             velocity_force: VelocityForceController::new(&config.gait, dt),
+            regrasp: Regrasp::new(&hand, &config.regrasp, config.gait.change, dt),
             f_prev: DVector::zeros(3 * n),
             G: DMatrix::zeros(6, 3 * n),
             f_limit: vec![0.0; n],
@@ -178,7 +182,8 @@ impl DualStagePlanner {
             free: self.supervisor.free_finger(),
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
-            grasped: self.supervisor.threshold().is_some(),
+            open: self.regrasp.phase().is_open().then(|| self.regrasp.reach().qd_des()),
+            grasped: self.supervisor.threshold().is_some() && !self.regrasp.phase().is_open(),
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
             Course::Run => {
@@ -186,7 +191,10 @@ impl DualStagePlanner {
                 self.run(&measurement, &reference);
                 self.guard.put_back(measurement);
             }
-            Course::Stop => self.stop(),
+            Course::Stop => {
+                self.regrasp.lose();
+                self.stop();
+            }
             Course::Repeat => {}
         }
         self.diagnostics.faults = self.guard.faults();
@@ -197,7 +205,8 @@ impl DualStagePlanner {
     /// The step on a measurement that can be used.
     fn run(&mut self, measurement: &Measurement, reference: &Reference) {
         self.grasp.update(&self.hand, &self.state, measurement);
-        if !self.guard.allows_gaits() {
+        let reference = &self.regrasp(measurement, reference);
+        if !self.allows_gaits() {
             self.supervisor.abort();
         }
         self.supervise(measurement);
@@ -205,15 +214,16 @@ impl DualStagePlanner {
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
-        if self.guard.allows_gaits() {
+        if self.allows_gaits() {
             self.choose_finger(measurement, &F_des);
         }
         self.optimise_forces(&F_des);
-        if !self.guard.blind() {
+        if !self.guard.blind() && self.controls() {
             self.robust.advance(&self.diagnostics.psi);
         }
         self.command.tau += &self.tau_own;
         self.drive_free_finger(measurement);
+        self.drive_arms();
         self.damp_fingers();
         self.test_motors();
         let at_limit = self.limiter.apply(&mut self.command.tau);
@@ -252,8 +262,8 @@ impl DualStagePlanner {
         if self.guard.discontinuous() {
             self.slip.skip();
         }
-        let guard = &self.guard;
-        let holds = |j| Some(j) != free && guard.trusts(j) && guard.drives(j);
+        let (guard, lies) = (&self.guard, self.regrasp.phase().lies());
+        let holds = |j| !lies && Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
@@ -340,9 +350,10 @@ impl DualStagePlanner {
     /// Eq. (8), with the free finger's force ramped or taken out.
     fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
-            let holds = self.guard.drives(j) && !self.guard.damps(j);
+            let open = self.regrasp.phase().is_open();
+            let holds = self.guard.drives(j) && !self.guard.damps(j) && !open;
             *limit = if holds { self.supervisor.force_limit(j, self.config.force.f_n_max) } else { 0.0 };
-            self.f_prev[3 * j + 2] += self.guard.squeeze();
+            self.f_prev[3 * j + 2] += self.guard.squeeze() + self.regrasp.squeeze();
         }
         let scale = self.wrench_scale();
         let F = F_des.component_mul(&scale);

@@ -1,6 +1,6 @@
 """A scenario: plant, reference, disturbances and the errors of the model, read from TOML and checked.
 
-The tables `gait`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
+The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
 on as they are, and the core refuses what it doesn't know.
 """
 
@@ -182,6 +182,7 @@ class Scenario(Table):
     disturbance: tuple[Disturbance, ...] = ()
     fault: tuple[Fault, ...] = ()
     gait: dict[str, Any] = {}
+    regrasp: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
     robust: dict[str, Any] = {}

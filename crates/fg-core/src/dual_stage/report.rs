@@ -11,6 +11,9 @@ impl DualStagePlanner {
         let d = &mut self.diagnostics;
         d.phase = self.supervisor.phase();
         d.free_finger = self.supervisor.free_finger();
+        d.regrasp = self.regrasp.phase();
+        d.set_downs = self.regrasp.count();
+        d.governed = *self.regrasp.reference();
         d.gaits = self.supervisor.gaits();
         d.last_end = self.supervisor.last_end();
         d.threshold = self.supervisor.threshold().unwrap_or(f64::NAN);

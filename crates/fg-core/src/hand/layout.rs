@@ -31,6 +31,8 @@ pub(super) struct Link {
     pub axis: Unit<Vector3<f64>>,
     pub com: Vector3<f64>,
     pub mass: f64,
+    /// About the centre of mass, in the link's frame, kg m^2.
+    pub inertia: Matrix3<f64>,
     pub stiffness: f64,
     pub spring_reference: f64,
     /// The independent joint that turns it, and how: angle = ratio q[at] + offset.
@@ -249,6 +251,7 @@ fn link(
     let axis = Unit::try_new(Vector3::from(joint.axis), 1e-9).ok_or_else(|| {
         Error::config(format!("{at}.axis"), "a vector that is not zero", format!("{:?}", joint.axis))
     })?;
+    let [xx, yy, zz, xy, xz, yz] = joint.inertia;
     Ok(Link {
         X_parent: Isometry3::from_parts(
             Translation3::from(Vector3::from(joint.position)),
@@ -258,6 +261,7 @@ fn link(
         axis,
         com: Vector3::from(joint.com),
         mass: joint.mass,
+        inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
         stiffness: joint.stiffness,
         spring_reference: joint.spring_reference,
         at: leader,

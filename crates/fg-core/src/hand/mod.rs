@@ -4,11 +4,13 @@
 //! in them ([`HandModel::joints`]). A coupled joint follows an independent one by a fixed ratio; it has a place in the
 //! kinematics, and none in the arrays.
 
+mod inertia;
 mod layout;
 mod limits;
 mod state;
 
 use crate::error::Error;
+pub use inertia::FingerInertia;
 use layout::Layout;
 pub use limits::TorqueLimits;
 use nalgebra::Vector3;
@@ -150,6 +152,15 @@ pub struct Coordinate {
     pub frictionloss: f64,
     /// The posture that the joint should return to, rad.
     pub reference: f64,
+}
+
+impl Coordinate {
+    /// The torque, N m, that overcomes damping and dry friction while the joint turns at `qd` rad/s.
+    ///
+    /// `qd` is a desired velocity, so that nothing chatters; below `friction_speed`, rad/s, dry friction counts in part.
+    pub fn drag(&self, qd: f64, friction_speed: f64) -> f64 {
+        self.damping * qd + self.frictionloss * (qd / friction_speed).clamp(-1.0, 1.0)
+    }
 }
 
 /// A hand, fixed in W.

@@ -1,8 +1,11 @@
 //! Kinematics of a hand, and the torques that hold it up, at one instant.
 
 use super::HandModel;
-use nalgebra::{DMatrix, Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use std::ops::Range;
+
+/// Regularisation of J J^T near singular postures, m^2/rad^2; a finger's own values are near 2e-3.
+const SINGULAR: f64 = 1e-6;
 
 /// Where the hand's parts are at one instant. Allocated once, overwritten by [`HandState::update`].
 #[derive(Debug, Clone)]
@@ -12,17 +15,18 @@ pub struct HandState {
     /// Links of each independent joint's followers.
     followers: Vec<Range<usize>>,
     /// Turns of each link for one of the independent joint that moves it, and that joint.
-    ratios: Vec<f64>,
-    leaders: Vec<usize>,
+    pub(super) ratios: Vec<f64>,
+    pub(super) leaders: Vec<usize>,
     /// Links of each finger, from the palm to the tip.
-    chains: Vec<Vec<usize>>,
+    pub(super) chains: Vec<Vec<usize>>,
     /// True where some joint follows another.
     coupled: bool,
-    /// By link: angle, a point of the axis, the axis, the centre of mass.
+    /// By link: angle, a point of the axis, the axis, the centre of mass, orientation in W.
     angles: Vec<f64>,
-    anchors: Vec<Vector3<f64>>,
-    axes: Vec<Vector3<f64>>,
-    coms: Vec<Vector3<f64>>,
+    pub(super) anchors: Vec<Vector3<f64>>,
+    pub(super) axes: Vec<Vector3<f64>>,
+    pub(super) coms: Vec<Vector3<f64>>,
+    pub(super) rotations: Vec<UnitQuaternion<f64>>,
     tips: Vec<Isometry3<f64>>,
 }
 
@@ -42,6 +46,7 @@ impl HandState {
             anchors: vec![Vector3::zeros(); n],
             axes: vec![Vector3::zeros(); n],
             coms: vec![Vector3::zeros(); n],
+            rotations: vec![UnitQuaternion::identity(); n],
             tips: vec![Isometry3::identity(); hand.n_fingers()],
         }
     }
@@ -61,6 +66,7 @@ impl HandState {
                 let offset = link.anchor - rotation * link.anchor;
                 X *= Isometry3::from_parts(Translation3::from(offset), rotation);
                 self.coms[k] = (X * nalgebra::Point3::from(link.com)).coords;
+                self.rotations[k] = X.rotation;
             }
             let tip = Translation3::from(Vector3::from(hand.fingers[j].tip.position));
             self.tips[j] = X * tip;
@@ -103,6 +109,17 @@ impl HandState {
             let turn = self.axes[k] * (self.ratios[k] * turns(self.leaders[k] - first)?);
             Some(UnitQuaternion::from_scaled_axis(turn) * (p - self.anchors[k]) + self.anchors[k])
         })
+    }
+
+    /// (J J^T)^-1 v in W, J the velocity Jacobian of the point `p_W` of the last link of finger `j`: J^T times it are the
+    /// smallest joint velocities that move the point at `v_W`, as well as the finger can.
+    pub fn solve_gram(&self, j: usize, p_W: &Vector3<f64>, v_W: &Vector3<f64>) -> Vector3<f64> {
+        let mut JJ = Matrix3::identity() * SINGULAR;
+        for at in self.joints(j) {
+            let column = self.jacobian_column(at, p_W);
+            JJ += column * column.transpose();
+        }
+        JJ.cholesky().map_or(Vector3::zeros(), |cholesky| cholesky.solve(v_W))
     }
 
     /// The velocity Jacobian (3, joints) in W of the point `p_W` of the last link of finger `j`.

@@ -42,8 +42,17 @@ pub struct Plan<'a> {
     pub qd_des: Option<&'a [f64]>,
     /// The free finger looks for the surface.
     pub pressing: bool,
+    /// Desired joint velocities, rad/s, while all fingers are off the object on purpose.
+    pub open: Option<&'a [f64]>,
     /// There has been a first grasp.
     pub grasped: bool,
+}
+
+impl Plan<'_> {
+    /// True where finger `j` is off the object on purpose.
+    fn frees(&self, j: usize) -> bool {
+        self.open.is_some() || self.free == Some(j)
+    }
 }
 
 /// How the control step went.
@@ -283,9 +292,11 @@ impl Guard {
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
         let (tactile, motors) = (&self.trusted.tactile, &self.motors);
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let touching = tactile[j].f_n > 0.0;
-            joints::Use { touching, holding: !free && motors.drives(j), qd_des: plan.qd_des.filter(|_| free) }
+            let swinging = plan.open.map(|qd_des| &qd_des[state.joints(j)]);
+            let qd_des = swinging.or(plan.qd_des.filter(|_| free));
+            joints::Use { touching, holding: !free && motors.drives(j), qd_des }
         };
         let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
         let trusted = self.trusted.q.as_mut_slice();
@@ -310,7 +321,7 @@ impl Guard {
     ) {
         let motors = &self.motors;
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let drives = motors.drives(j);
             touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
         };
@@ -328,7 +339,7 @@ impl Guard {
         state: &HandState,
     ) {
         let (joints, motors) = (&self.joints, &self.motors);
-        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j) && motors.drives(j);
+        let sticks = |j: usize| !plan.frees(j) && joints.trusts(j) && motors.drives(j);
         let motion = self.odometry.motion(hand, state, &self.trusted.tactile, sticks);
         let centre = self.odometry.centre(state);
         let X_WO = &measurement.X_WO;
