@@ -183,7 +183,7 @@ impl DualStagePlanner {
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
             open: self.regrasp.phase().is_open().then(|| self.regrasp.reach().qd_des()),
-            grasped: self.supervisor.threshold().is_some() && !self.regrasp.phase().is_open(),
+            grasped: self.supervisor.threshold().is_some() && self.controls(),
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
             Course::Run => {
