@@ -265,6 +265,9 @@ impl DualStagePlanner {
         let (guard, lies) = (&self.guard, self.regrasp.phase().lies());
         let holds = |j| !lies && Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
+        if lies {
+            return; // nothing holds: neither slip nor noise can be told
+        }
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
             self.assume_friction();

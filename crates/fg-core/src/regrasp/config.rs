@@ -90,7 +90,7 @@ impl Default for RegraspConfig {
             stroke: 2.36,
             lift_min: 0.1,
             acceleration: 0.03,
-            swing_acceleration: 0.3,
+            swing_acceleration: 0.6,
             swing_time: 0.3,
             clearance: 0.6,
             near: 0.1,
