@@ -29,7 +29,7 @@ use crate::spatial::{angular, linear, pose_error};
 use config::{Change, RegraspConfig};
 use governor::Governor;
 use nalgebra::{Isometry3, Vector3, Vector6};
-use path::smooth;
+use path::{smooth, Axis};
 use phase::Phase;
 use reach::Reach;
 
@@ -41,6 +41,8 @@ const FILTER: f64 = 0.01;
 const TORQUE_FILTER: f64 = 0.05;
 /// Time for which the signs of a set-down must last, s.
 const FELT: f64 = 0.006;
+/// Share of a lift after which the object turns again.
+const TURNS_FROM: f64 = 0.4;
 /// The object stands still this long before it goes down, s.
 const CALM: f64 = 0.05;
 
@@ -110,6 +112,8 @@ pub struct Regrasp {
     /// Height of the object's origin when it lay last, m, and which way in the object was up.
     rest: f64,
     up_O: Vector3<f64>,
+    /// Where its origin is, behind the noise, m.
+    place: Vector3<f64>,
     /// Where the fingers are, against the first grasp, rad: they turn with the object.
     azimuth: f64,
     /// Turn of this grasp so far, rad.
@@ -165,6 +169,7 @@ impl Regrasp {
             scale: None,
             rest: 0.0,
             up_O: Vector3::z(),
+            place: Vector3::zeros(),
             azimuth: 0.0,
             turned: 0.0,
             failed: 0,
@@ -277,6 +282,7 @@ impl Regrasp {
     fn filter(&mut self, view: &View<'_>) {
         let share = 1.0 - (-self.dt / FILTER).exp();
         self.force += (linear(view.F_des).dot(&self.up) - self.force) * share;
+        self.place += (view.X_WO.translation.vector - self.place) * share;
         let share = 1.0 - (-self.dt / TORQUE_FILTER).exp();
         for (filtered, tau) in self.tau.iter_mut().zip(view.tau) {
             *filtered += (tau - *filtered) * share;
@@ -339,13 +345,13 @@ impl Regrasp {
                 }
             }
             Phase::Return => {
-                if self.reach.go(view, &self.up, self.elapsed) {
+                if self.reach.go(view, self.elapsed) {
                     self.enter(Phase::Approach);
                 }
             }
             Phase::Approach => self.approach(view, scale),
             Phase::Rest => {
-                self.reach.go(view, &self.up, self.elapsed);
+                self.reach.go(view, self.elapsed);
             }
             Phase::Preload => {
                 let s = (self.elapsed / c.preload_time.max(1e-9)).min(1.0);
@@ -399,7 +405,7 @@ impl Regrasp {
     fn lower(&mut self, view: &View<'_>, scale: Scale) {
         let c = &self.config;
         let r = scale.radius;
-        let slower = self.governor.drift_speed(&self.up) - c.acceleration * G * self.dt;
+        let slower = self.governor.drift_speed(&self.up) - 2.0 * c.acceleration * G * self.dt;
         self.governor.drift(&self.up, slower.max(-c.lower_speed * r));
         let height = view.X_WO.translation.vector.dot(&self.up);
         let reference = self.out.X_WD.translation.vector.dot(&self.up);
@@ -427,7 +433,7 @@ impl Regrasp {
         let aside = if self.failed % 2 == 1 { spread } else { -spread };
         self.azimuth = -0.5 * self.config.stroke * sense + aside;
         let rests = self.failed > self.config.attempts;
-        self.reach.leave(view, &self.up, self.azimuth, rests);
+        self.reach.leave(view, Axis::new(&self.place, &self.up), self.azimuth, rests);
         self.enter(if rests { Phase::Rest } else { Phase::Return });
     }
 
@@ -436,7 +442,7 @@ impl Regrasp {
         let (touch, wait) = (c.touch_force, c.wait_force);
         let touch = self.force_share(touch, view.friction) * scale.weight;
         let wait = self.force_share(wait, view.friction) * scale.weight;
-        self.reach.approach(view, &self.up, c.approach_speed * scale.radius, touch, wait);
+        self.reach.approach(view, c.approach_speed * scale.radius, touch, wait);
         if self.reach.waits() > c.touch_time {
             self.squeeze_from = wait;
             self.enter(Phase::Preload);
@@ -480,7 +486,7 @@ impl Regrasp {
         let (share, rate) = smooth(s);
         self.governor.lift(share, rate / self.lift_time);
         self.squeeze = self.squeeze_from * (1.0 - s).max(0.0);
-        if s > 0.5 && !self.unsupported {
+        if s > TURNS_FROM && !self.unsupported {
             let wanted = self.wanted(view, acceleration);
             self.turn(wanted, acceleration);
         }

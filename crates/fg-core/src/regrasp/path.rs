@@ -1,6 +1,6 @@
 //! The way of a fingertip round an object that lies: out, round, and in again.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
 /// A place about the axis through the object's origin along `up`: distance from it, angle, rad, and height over the origin.
@@ -24,11 +24,11 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// The axis along the unit vector `up` through the origin of the object at `X_WO`; angles count in W.
-    pub fn new(X_WO: &Isometry3<f64>, up: &Vector3<f64>) -> Self {
+    /// The axis along the unit vector `up` through `origin`; angles count in W.
+    pub fn new(origin: &Vector3<f64>, up: &Vector3<f64>) -> Self {
         let across = if up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
         let x = (across - up * up.dot(&across)).normalize();
-        Self { origin: X_WO.translation.vector, up: *up, x, y: up.cross(&x) }
+        Self { origin: *origin, up: *up, x, y: up.cross(&x) }
     }
 
     /// The place of the point `p_W`.
@@ -65,9 +65,9 @@ pub const PEAK: f64 = 5.774;
 
 /// Shares of the way's time: until it is clear of the object, from when and until when it goes round, and from when it goes
 /// in.
-const OUT: f64 = 0.35;
-const ROUND: (f64, f64) = (0.1, 0.9);
-const IN: f64 = 0.7;
+const OUT: f64 = 0.4;
+const ROUND: (f64, f64) = (0.1, 0.95);
+const IN: f64 = 0.6;
 
 /// Out to the radius `clear`, round to `to`, and in.
 #[derive(Debug, Clone, Copy, Default)]

@@ -32,6 +32,8 @@ pub struct Reach {
     arms: Arms,
     fingers: Vec<Finger>,
     radius: f64,
+    /// The axis about which they go: where the object lay when they left it, so that its noise does not shake them.
+    axis: Axis,
     /// Largest distance of a tip's centre from the axis in any grasp, m.
     farthest: f64,
     /// Duration of the way, s.
@@ -51,6 +53,7 @@ impl Reach {
             arms: Arms::new(hand, config, dt),
             fingers: vec![Finger::default(); hand.n_fingers()],
             radius: 0.0,
+            axis: Axis::new(&Vector3::zeros(), &hand.up()),
             farthest: 0.0,
             time: 0.0,
             waits: 0.0,
@@ -87,7 +90,7 @@ impl Reach {
 
     /// Takes the measure of the first grasp; None where it has none, the contacts being on the axis.
     pub fn measure(&mut self, view: &View<'_>, up: &Vector3<f64>) -> Option<Scale> {
-        let axis = Axis::new(view.X_WO, up);
+        let axis = Axis::new(&view.X_WO.translation.vector, up);
         let n = self.fingers.len() as f64;
         let radius = view.grasp.contacts().iter().map(|c| axis.place(&c.p_WC).radius).sum::<f64>() / n;
         for (j, finger) in self.fingers.iter_mut().enumerate() {
@@ -100,16 +103,16 @@ impl Reach {
 
     /// Remembers how far out the tips of this grasp are.
     pub fn remember(&mut self, view: &View<'_>, up: &Vector3<f64>) {
-        let axis = Axis::new(view.X_WO, up);
+        let axis = Axis::new(&view.X_WO.translation.vector, up);
         for j in 0..self.fingers.len() {
             self.farthest = self.farthest.max(axis.place(&view.state.tip(j).translation.vector).radius);
         }
     }
 
-    /// The fingers leave the object for places `azimuth` rad round from the first grasp; with `clear`, they stay clear of it
-    /// where they are.
-    pub fn leave(&mut self, view: &View<'_>, up: &Vector3<f64>, azimuth: f64, clear: bool) {
-        let axis = Axis::new(view.X_WO, up);
+    /// The fingers leave the object at `axis` for places `azimuth` rad round from the first grasp; with `clear`, they stay
+    /// clear of it where they are.
+    pub fn leave(&mut self, view: &View<'_>, axis: Axis, azimuth: f64, clear: bool) {
+        self.axis = axis;
         let r = self.radius;
         let far = self.farthest + self.config.clearance * r;
         let near = self.farthest + self.config.near * r;
@@ -130,8 +133,8 @@ impl Reach {
     }
 
     /// Moves the fingers along their ways, `elapsed` seconds from their beginning; true at the end.
-    pub fn go(&mut self, view: &View<'_>, up: &Vector3<f64>, elapsed: f64) -> bool {
-        let axis = Axis::new(view.X_WO, up);
+    pub fn go(&mut self, view: &View<'_>, elapsed: f64) -> bool {
+        let axis = self.axis;
         self.arms.settle(view.hand);
         let ds = self.dt / self.time;
         let s = elapsed / self.time;
@@ -143,8 +146,8 @@ impl Reach {
     }
 
     /// The fingers come in at `speed`, m/s, until they feel `touch` N, and wait with `wait` N.
-    pub fn approach(&mut self, view: &View<'_>, up: &Vector3<f64>, speed: f64, touch: f64, wait: f64) {
-        let axis = Axis::new(view.X_WO, up);
+    pub fn approach(&mut self, view: &View<'_>, speed: f64, touch: f64, wait: f64) {
+        let axis = self.axis;
         self.arms.settle(view.hand);
         self.force = wait;
         let mut all = true;
