@@ -262,10 +262,11 @@ impl DualStagePlanner {
         if self.guard.discontinuous() {
             self.slip.skip();
         }
-        let (guard, lies) = (&self.guard, self.regrasp.phase().lies());
-        let holds = |j| !lies && Some(j) != free && guard.trusts(j) && guard.drives(j);
+        // Its filters start while a new grasp is checked, so that they have settled when it counts.
+        let (guard, settles) = (&self.guard, self.controls());
+        let holds = |j| settles && Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
-        if lies {
+        if self.regrasp.phase().lies() {
             return; // nothing holds: neither slip nor noise can be told
         }
         let fastest = self.slip.fastest(self.config.force.slip_speed);

@@ -104,7 +104,7 @@ impl Default for RegraspConfig {
             down_search: 0.25,
             slack: 0.16,
             lift_error: 0.12,
-            release_time: 0.06,
+            release_time: 0.09,
             preload_time: 0.09,
             check_time: 0.05,
             touch_time: 0.02,

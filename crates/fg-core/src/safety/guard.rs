@@ -323,7 +323,7 @@ impl Guard {
         let using = |j: usize| {
             let free = plan.frees(j);
             let drives = motors.drives(j);
-            touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            touch::Use { drives, open: plan.open.is_some(), holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);

@@ -19,6 +19,8 @@ const ON_ITS_WAY: f64 = 1e-3;
 pub struct Use {
     /// False where the finger's motors give no torque: it lies where it lies.
     pub drives: bool,
+    /// True where all fingers are off the object on purpose: none of them should feel anything.
+    pub open: bool,
     /// True where the force optimiser gives the finger its force.
     pub holding: bool,
     /// True where the finger looks for the surface.
@@ -193,7 +195,7 @@ impl Tip {
         c: &SafetyConfig,
         elapsed: f64,
     ) -> bool {
-        if reading.f_n > threshold || !using.drives {
+        if reading.f_n > threshold || !using.drives || using.open {
             self.gone = false;
             self.pressing = None;
             return false;
