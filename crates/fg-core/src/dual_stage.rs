@@ -182,7 +182,7 @@ impl DualStagePlanner {
             free: self.supervisor.free_finger(),
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
-            open: self.regrasp.phase().is_open().then(|| self.regrasp.reach().qd_des()),
+            open: (!self.controls()).then(|| self.regrasp.reach().qd_des()),
             grasped: self.supervisor.threshold().is_some() && self.controls(),
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {

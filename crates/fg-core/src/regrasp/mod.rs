@@ -416,6 +416,7 @@ impl Regrasp {
             self.rest = height;
             self.count += 1;
             self.governor.stand();
+            self.reach.halt(view);
             // The support has taken over already.
             self.share = (self.force / self.force_in_air.max(1e-9)).clamp(0.0, 1.0);
             self.enter(Phase::Release);
@@ -444,6 +445,7 @@ impl Regrasp {
         let wait = self.force_share(wait, view.friction) * scale.weight;
         self.reach.approach(view, c.approach_speed * scale.radius, touch, wait);
         if self.reach.waits() > c.touch_time {
+            self.reach.halt(view);
             self.squeeze_from = wait;
             self.enter(Phase::Preload);
             self.squeeze = wait;

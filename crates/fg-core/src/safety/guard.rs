@@ -42,7 +42,7 @@ pub struct Plan<'a> {
     pub qd_des: Option<&'a [f64]>,
     /// The free finger looks for the surface.
     pub pressing: bool,
-    /// Desired joint velocities, rad/s, while all fingers are off the object on purpose.
+    /// Desired joint velocities, rad/s, while the object lies and all fingers are off it, or may be.
     pub open: Option<&'a [f64]>,
     /// There has been a first grasp.
     pub grasped: bool,

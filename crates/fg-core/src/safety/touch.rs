@@ -19,7 +19,7 @@ const ON_ITS_WAY: f64 = 1e-3;
 pub struct Use {
     /// False where the finger's motors give no torque: it lies where it lies.
     pub drives: bool,
-    /// True where all fingers are off the object on purpose: none of them should feel anything.
+    /// True where all fingers are off the object on purpose, or about to be: none of them need feel anything.
     pub open: bool,
     /// True where the force optimiser gives the finger its force.
     pub holding: bool,
