@@ -61,6 +61,8 @@ pub struct DualStagePlanner {
     tau_free: Vec<f64>,
     steady: SteadyWrench,
     limiter: TorqueLimiter,
+    /// Some torque of the last step was at its limit.
+    at_limit: bool,
     /// Share of the torques that is left after one step in which nothing is held.
     fade: f64,
     command: Command,
@@ -144,6 +146,7 @@ impl DualStagePlanner {
             tau_free: vec![0.0; hand.most_joints()],
             steady: SteadyWrench::new(dt),
             limiter: TorqueLimiter::new(limits, config.force.tau_rate_max, dt),
+            at_limit: false,
             fade: (-dt / config.safety.stop_time).exp(),
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
@@ -226,9 +229,9 @@ impl DualStagePlanner {
         self.drive_arms();
         self.damp_fingers();
         self.test_motors();
-        let at_limit = self.limiter.apply(&mut self.command.tau);
+        self.at_limit = self.limiter.apply(&mut self.command.tau);
         self.diagnose(&F_des);
-        self.report(at_limit);
+        self.report();
     }
 
     /// Quality, first grasp, and the gait's phases.
@@ -266,8 +269,8 @@ impl DualStagePlanner {
         let (guard, settles) = (&self.guard, self.controls());
         let holds = |j| settles && Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
-        if self.regrasp.phase().lies() {
-            return; // nothing holds: neither slip nor noise can be told
+        if !self.slip_tells() {
+            return;
         }
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {

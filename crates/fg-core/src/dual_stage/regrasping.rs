@@ -61,6 +61,13 @@ impl DualStagePlanner {
         !phase.lies() || phase == Phase::Check
     }
 
+    /// True where slip tells of friction: not where nothing holds, not where the object comes to stand on its support, and
+    /// not where a torque is at its limit, which a lower friction would only ask more of.
+    pub(super) fn slip_tells(&self) -> bool {
+        let phase = self.regrasp.phase();
+        !phase.lies() && phase != Phase::Lower && (phase == Phase::Idle || !self.at_limit)
+    }
+
     /// Drives the fingers that are off the object to their next grasp.
     pub(super) fn drive_arms(&mut self) {
         if !self.regrasp.phase().is_open() {

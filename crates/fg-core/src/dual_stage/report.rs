@@ -32,13 +32,13 @@ impl DualStagePlanner {
         d.tau.copy_from(&self.command.tau);
     }
 
-    /// Tells the guard how the step went; `at_limit`: some torque is.
-    pub(super) fn report(&mut self, at_limit: bool) {
+    /// Tells the guard how the step went.
+    pub(super) fn report(&mut self) {
         let mut bounds = self.tau_min.iter().zip(self.tau_max.iter());
         self.guard.note(Outcome {
             solved: self.diagnostics.status == ForceStatus::Solved,
             box_empty: bounds.any(|(low, high)| *low > 0.0 || *high < 0.0),
-            saturated: at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
+            saturated: self.at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
             overdue: self.supervisor.overdue(),
         });
     }
