@@ -89,8 +89,13 @@ pub struct GaitConfig {
     pub project_rate_box: bool,
     /// Quality rate below which a gait ends, 1/s.
     pub delta: f64,
-    /// Velocity gain of eq. (5), N m s/rad.
-    pub K_v: f64,
+    /// Velocity gain of eq. (5), N m s/rad; `null`: the damping of each joint, with which K_v qd_des turns it at qd_des.
+    pub K_v: Option<f64>,
+    /// Bandwidth of the loop that closes the free finger's velocity on the encoders, 1/s; zero: K_v alone, as in the paper,
+    /// where a finger whose damping is not as modelled runs ahead or stays behind.
+    pub velocity_bandwidth: f64,
+    /// Time constant of the filter on the differences of the encoders, s.
+    pub velocity_filter: f64,
     /// Force gain of eq. (5).
     pub K_f: f64,
     /// Desired normal force of a sliding finger, N. The paper: "a constant small force".
@@ -143,7 +148,9 @@ impl Default for GaitConfig {
             sigma: 0.008,
             project_rate_box: true,
             delta: 1e-5,
-            K_v: 0.05,
+            K_v: None,
+            velocity_bandwidth: 10.0,
+            velocity_filter: 0.005,
             K_f: 1.5,
             f_des: 0.15,
             follow_surface: true,
@@ -241,14 +248,19 @@ pub struct RobustConfig {
     pub anti_windup: f64,
     /// Use the artefact's reference prefilter.
     pub prefilter: bool,
-    /// Share of the joints' nominal damping that is overcome along the desired motion; zero: none. Deviation: not in the
-    /// paper.
+    /// Share of the joints' nominal damping and dry friction that is overcome along the desired motion; zero: none.
+    /// Deviation: not in the paper.
     pub feedforward: f64,
+    /// Desired joint speed from which dry friction is overcome in full, rad/s.
+    pub friction_speed: f64,
+    /// Rate at which a finger with more joints than the contact needs returns to its posture of the first grasp, 1/s: the
+    /// stiffness over the joint's damping. Zero: not at all. Deviation: the paper's fingers have no spare joints.
+    pub posture_rate: f64,
 }
 
 impl Default for RobustConfig {
     fn default() -> Self {
-        Self { anti_windup: 0.1, prefilter: true, feedforward: 1.0 }
+        Self { anti_windup: 0.1, prefilter: true, feedforward: 1.0, friction_speed: 0.05, posture_rate: 2.0 }
     }
 }
 
@@ -302,7 +314,9 @@ impl Config {
             ("gait.qd_max", g.qd_max, positive, 100.0),
             ("gait.sigma", g.sigma, positive, 100.0),
             ("gait.delta", g.delta, -1e3, 1e3),
-            ("gait.K_v", g.K_v, 0.0, 100.0),
+            ("gait.K_v", g.K_v.unwrap_or(0.0), 0.0, 100.0),
+            ("gait.velocity_bandwidth", g.velocity_bandwidth, 0.0, 1e3),
+            ("gait.velocity_filter", g.velocity_filter, 0.0, 1.0),
             ("gait.K_f", g.K_f, 0.0, 100.0),
             ("gait.f_des", g.f_des, 0.0, 100.0),
             ("gait.approach_speed", g.approach_speed, 0.0, 1.0),
@@ -335,6 +349,8 @@ impl Config {
             ("force.friction_floor", f.friction_floor, 0.01, 10.0),
             ("robust.anti_windup", self.robust.anti_windup, 0.0, 1.0),
             ("robust.feedforward", self.robust.feedforward, 0.0, 10.0),
+            ("robust.friction_speed", self.robust.friction_speed, positive, 1e3),
+            ("robust.posture_rate", self.robust.posture_rate, 0.0, 1e3),
             ("torque.K_p", t.K_p, 0.0, 1e3),
             ("torque.K_i", t.K_i, 0.0, 1e5),
             ("torque.K_d", t.K_d, 0.0, 10.0),

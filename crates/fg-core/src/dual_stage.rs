@@ -14,8 +14,9 @@ use crate::gait::supervisor::{Phase, Supervisor};
 use crate::gait::velocity_force::VelocityForceController;
 use crate::grasp::{Grasp, Scene};
 use crate::hand::{HandModel, HandState, TorqueLimits};
-use crate::manipulation::feedforward::damping_torque;
+use crate::manipulation::feedforward::drag_torque;
 use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, ForceStatus, SolverUsed};
+use crate::manipulation::posture::Posture;
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
 use crate::regrasp::Regrasp;
@@ -46,6 +47,7 @@ pub struct DualStagePlanner {
     planner: GaitPlanner,
     velocity_force: VelocityForceController,
     regrasp: Regrasp,
+    posture: Posture,
     /// Contact forces of the last step in their contact frames, N.
     f_prev: DVector<f64>,
     /// Grasp map with its torque rows weighted, for the force optimiser.
@@ -134,8 +136,9 @@ impl DualStagePlanner {
             friction: AdaptiveFriction::new(&config.force, dt),
             pyramid,
             planner: GaitPlanner::new(&hand, &config.gait, dt),
-            velocity_force: VelocityForceController::new(&config.gait, dt),
             regrasp: Regrasp::new(&hand, &config.regrasp, config.gait.change, dt),
+            velocity_force: VelocityForceController::new(&config, dt),
+            posture: Posture::new(&hand, &config.robust),
             f_prev: DVector::zeros(3 * n),
             G: DMatrix::zeros(6, 3 * n),
             f_limit: vec![0.0; n],
@@ -240,6 +243,7 @@ impl DualStagePlanner {
         let first = self.supervisor.observe(&self.grasp);
         if first {
             self.quality.set_first_grasp(&scene);
+            self.posture.set_home(scene.q);
         }
         let quality = self.quality.quality(&scene);
         if first {
@@ -304,16 +308,14 @@ impl DualStagePlanner {
     /// Torques left for the contact forces, once the fingers' own weight and motion have had theirs.
     fn bound_torques(&mut self, measurement: &Measurement) {
         self.hold_up();
-        let share = self.config.robust.feedforward;
-        if share > 0.0 {
-            let scene = scene!(self, measurement);
-            // Eq. (5) has its own velocity term for the finger that slides.
-            let sliding = self.supervisor.sliding_finger();
-            for k in (0..self.hand.n_fingers()).filter(|k| Some(*k) != sliding) {
-                damping_torque(&self.hand, k, &scene, share, self.tau_own.as_mut_slice());
-            }
+        let scene = scene!(self, measurement);
+        let (limits, tau) = (self.limiter.limits(), self.tau_own.as_mut_slice());
+        // The finger that slides has its own velocity term, eq. (5), and its posture from the LP.
+        let sliding = self.supervisor.sliding_finger();
+        for k in (0..self.hand.n_fingers()).filter(|k| Some(*k) != sliding) {
+            drag_torque(&self.hand, k, &scene, &self.config.robust, tau);
+            self.posture.add_torque(&self.hand, k, &scene, (limits.min(), limits.max()), tau);
         }
-        let limits = self.limiter.limits();
         for (at, tau_own) in self.tau_own.iter().enumerate() {
             self.tau_min[at] = limits.min()[at] - tau_own;
             self.tau_max[at] = limits.max()[at] - tau_own;
@@ -396,7 +398,7 @@ impl DualStagePlanner {
             self.planner.press(k, &scene);
         }
         let (qd_des, f_des) = (self.planner.qd_des(), self.config.gait.f_des);
-        self.velocity_force.update(k, &scene, qd_des, f_des, &mut self.tau_free);
+        self.velocity_force.update(k, &self.hand, &scene, qd_des, f_des, &mut self.tau_free);
         for (at, tau) in self.hand.joints(k).zip(&self.tau_free) {
             self.command.tau[at] = tau + self.tau_own[at];
         }

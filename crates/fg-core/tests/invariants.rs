@@ -79,8 +79,9 @@ fn config() -> impl Strategy<Value = Config> {
         (c.gait.w1, c.gait.w2, c.gait.sigma, c.gait.unload_time, c.gait.project_rate_box) = gait;
         (c.force.alpha1, c.force.alpha3, c.force.friction, c.force.edges, _) = force;
         c.force.tau_max = Some(force.4);
-        (c.force.f_n_max, c.gait.K_v, c.robust.anti_windup, c.robust.prefilter, c.force.tau_rate_max) = other;
-        c.gait.K_v = c.gait.K_v.min(100.0);
+        let K_v: f64;
+        (c.force.f_n_max, K_v, c.robust.anti_windup, c.robust.prefilter, c.force.tau_rate_max) = other;
+        c.gait.K_v = Some(K_v.min(100.0));
         c.gait.plane = if c.robust.prefilter { QualityPlane::Object } else { QualityPlane::Contacts };
         c
     })

@@ -22,6 +22,7 @@ impl DualStagePlanner {
         self.velocity_force.reset(0.0);
         self.robust.forget();
         self.regrasp.reset();
+        self.posture.reset();
         self.limiter.reset();
         self.command.tau.fill(0.0);
         self.diagnostics = Diagnostics::new(&self.hand.counts());

@@ -3,5 +3,6 @@
 pub mod feedforward;
 pub mod force;
 pub mod lti;
+pub mod posture;
 pub mod robust;
 pub mod slip;
