@@ -17,6 +17,7 @@ from fingergait.paths import find
 from fingergait.run.log import Log, columns, describe
 from fingergait.run.loss import LossMonitor, reason
 from fingergait.run.metrics import Timing, metrics_of
+from fingergait.run.regrasping import LYING
 from fingergait.scenario import Scenario
 from fingergait.scenario.reference import Trajectory
 from fingergait.sim.plant import MujocoPlant
@@ -91,7 +92,10 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         solver[diagnostics.solver] += 1
         if k % _CHECK_EVERY == 0:
             standing = diagnostics.safe_mode != "normal"
-            if monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
+            # What the object is to do now: what is asked, less what it missed while it was set down.
+            goal = pose if diagnostics.regrasp == "idle" else diagnostics.governed
+            lying = diagnostics.regrasp in LYING
+            if monitor.update(plant.t, plant.object_pose, goal, plant.sensors.normal_force, standing, lying):
                 lost = reason(log, scene, monitor.symptom)
                 break
         if watch is not None and k % watch_every == 0 and watch(plant, log):

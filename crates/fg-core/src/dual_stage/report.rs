@@ -2,6 +2,7 @@
 
 use super::DualStagePlanner;
 use crate::manipulation::force::ForceStatus;
+use crate::regrasp::phase::Phase;
 use crate::safety::guard::Outcome;
 use nalgebra::Vector6;
 
@@ -40,6 +41,7 @@ impl DualStagePlanner {
             box_empty: bounds.any(|(low, high)| *low > 0.0 || *high < 0.0),
             saturated: self.at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
             overdue: self.supervisor.overdue(),
+            aground: matches!(self.regrasp.phase(), Phase::Stand | Phase::Rest),
         });
     }
 }

@@ -31,6 +31,22 @@ pub enum Phase {
 }
 
 impl Phase {
+    /// Every phase, in order of its number.
+    pub const ALL: [Self; 12] = [
+        Self::Idle,
+        Self::Turn,
+        Self::Brake,
+        Self::Lower,
+        Self::Release,
+        Self::Return,
+        Self::Approach,
+        Self::Preload,
+        Self::Check,
+        Self::Lift,
+        Self::Stand,
+        Self::Rest,
+    ];
+
     /// The phase's name, in lower case.
     pub fn as_str(self) -> &'static str {
         match self {

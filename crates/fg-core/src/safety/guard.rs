@@ -57,7 +57,7 @@ impl Plan<'_> {
 
 /// How the control step went.
 #[derive(Debug, Clone, Copy, Default)]
-#[allow(clippy::struct_excessive_bools)] // four facts that do not depend on each other
+#[allow(clippy::struct_excessive_bools)] // five facts that do not depend on each other
 pub struct Outcome {
     /// The contact forces are certified.
     pub solved: bool,
@@ -67,6 +67,8 @@ pub struct Outcome {
     pub saturated: bool,
     /// The grasp has grown bad, and no finger can be freed.
     pub overdue: bool,
+    /// The object was set down for good, or cannot be.
+    pub aground: bool,
 }
 
 /// Conditions of the whole step that must last before they count.
@@ -77,6 +79,7 @@ struct Conditions {
     solver: Debounce,
     saturated: Debounce,
     overdue: Debounce,
+    aground: Debounce,
     gone: Debounce,
     seeking: Debounce,
 }
@@ -287,6 +290,8 @@ impl Guard {
         self.faults.insert_if(saturated, Fault::Saturated);
         let overdue = self.conditions.overdue.update(outcome.overdue, dt, 0.0, c.recovery_time);
         self.faults.insert_if(overdue, Fault::Overdue);
+        let aground = self.conditions.aground.update(outcome.aground, dt, 0.0, c.recovery_time);
+        self.faults.insert_if(aground, Fault::Aground);
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
@@ -372,7 +377,7 @@ impl Guard {
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let strained = conditions.saturated.confirmed() || conditions.overdue.confirmed();
-        let mut mode = if slow || strained { SafeMode::Hold } else { SafeMode::Normal };
+        let mut mode = if slow || strained || conditions.aground.confirmed() { SafeMode::Hold } else { SafeMode::Normal };
         if self.blind || self.pose.failed() {
             mode = SafeMode::Squeeze;
         }

@@ -75,11 +75,13 @@ pub enum Fault {
     FingerLost = 17,
     /// The grasp has grown bad, and no finger can be freed to mend it.
     Overdue = 18,
+    /// The object cannot be taken again, or not be set down: it lies and is left alone, or is held where it is.
+    Aground = 19,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -99,6 +101,7 @@ impl Fault {
         Self::Motor,
         Self::FingerLost,
         Self::Overdue,
+        Self::Aground,
     ];
 
     /// The name used in logs.
@@ -123,6 +126,7 @@ impl Fault {
             Self::Motor => "motor",
             Self::FingerLost => "finger_lost",
             Self::Overdue => "overdue",
+            Self::Aground => "aground",
         }
     }
 }
