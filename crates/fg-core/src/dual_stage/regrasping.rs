@@ -28,6 +28,7 @@ impl DualStagePlanner {
             grasped: self.supervisor.threshold().is_some(),
             fit: self.guard.allows_gaits(),
             stands: self.guard.mode() != SafeMode::Normal,
+            weak: (0..self.hand.n_fingers()).any(|j| !self.guard.drives(j)),
             strained,
             overdue,
         };

@@ -90,6 +90,8 @@ pub struct View<'a> {
     pub fit: bool,
     /// What is asked stands because something is wrong.
     pub stands: bool,
+    /// Some finger's motors give nothing: what is in the air may not stay there.
+    pub weak: bool,
     /// The grasp is: a torque at its limit, or the wrench not delivered, for long.
     pub strained: bool,
     /// No finger can be spared although the grasp asks for it.
@@ -517,6 +519,16 @@ impl Regrasp {
                 let left = (1.0 - self.elapsed / self.config.release_time.max(1e-9)).max(0.0);
                 self.share = self.share_from * left;
                 self.squeeze = self.squeeze_from * left;
+            }
+            Phase::Lower if view.weak => {
+                if let Some(scale) = self.scale {
+                    self.lower(view, scale);
+                }
+            }
+            Phase::Turn | Phase::Brake | Phase::Lift if view.weak => {
+                self.governor.stand();
+                self.force_in_air = view.weight;
+                self.enter(Phase::Lower);
             }
             _ => self.governor.stand(),
         }
