@@ -142,8 +142,7 @@ impl Diagnostics {
     /// Pose (7,) in W that the object is to have now: what is asked, less what was missed while it lay.
     #[getter]
     fn governed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let (p, q) =
-            (self.core.governed.X_WD.translation.vector, self.core.governed.X_WD.rotation.coords);
+        let (p, q) = (self.core.governed.X_WD.translation.vector, self.core.governed.X_WD.rotation.coords);
         array1(py, &[p.x, p.y, p.z, q.w, q.x, q.y, q.z])
     }
 

@@ -40,7 +40,7 @@ impl DualStagePlanner {
             solved: self.diagnostics.status == ForceStatus::Solved,
             box_empty: bounds.any(|(low, high)| *low > 0.0 || *high < 0.0),
             saturated: self.at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
-            overdue: self.supervisor.overdue(),
+            overdue: self.supervisor.overdue() && self.regrasp.phase() == Phase::Idle,
             aground: matches!(self.regrasp.phase(), Phase::Stand | Phase::Rest),
         });
     }

@@ -171,7 +171,17 @@ impl RobustController {
         }
         let lift = -g_W * mass.unwrap_or(K.nominal.mass);
         let zero = Vector6::zeros();
-        Ok(Self { K, config: config.clone(), dt, lift, learnt: zero, e: zero, u: zero, V_WD: zero, filtered: None })
+        Ok(Self {
+            K,
+            config: config.clone(),
+            dt,
+            lift,
+            learnt: zero,
+            e: zero,
+            u: zero,
+            V_WD: zero,
+            filtered: None,
+        })
     }
 
     /// Returns to rest.

@@ -208,9 +208,9 @@ impl Regrasp {
         self.phase
     }
 
-    /// True where gaits are to be kept from starting: they are not wanted, or the object is on its way down or up.
+    /// True where gaits are to be kept from starting: regrasping has taken over, for good.
     pub fn excludes_gaits(&self) -> bool {
-        !matches!(self.phase, Phase::Idle | Phase::Turn | Phase::Stand)
+        self.phase != Phase::Idle
     }
 
     /// Share of the object's weight that the fingers carry.
@@ -324,7 +324,7 @@ impl Regrasp {
             Phase::Turn => {
                 let wanted = self.wanted(view, turn_acceleration);
                 let over = self.turn(wanted, turn_acceleration);
-                if over || view.strained || view.overdue || self.at_limits(view) {
+                if over || view.strained || self.at_limits(view) {
                     self.enter(Phase::Brake);
                 }
             }
@@ -466,8 +466,8 @@ impl Regrasp {
             return;
         }
         let W = scale.weight;
-        let delivered = linear(view.psi).norm() <= c.slack * W
-            && angular(view.psi).norm() <= c.slack * W * scale.radius;
+        let delivered =
+            linear(view.psi).norm() <= c.slack * W && angular(view.psi).norm() <= c.slack * W * scale.radius;
         let touching = view.grasp.contacts().iter().all(|contact| contact.touching);
         if delivered && touching {
             self.reach.remember(view, &self.up);

@@ -103,6 +103,8 @@ impl Way {
             ((self.clear - self.to.radius).abs(), 1.0 - IN),
             ((self.to.height - self.from.height).abs(), 1.0),
         ];
-        legs.into_iter().map(|(length, share)| (PEAK * length / acceleration).sqrt() / share).fold(0.0, f64::max)
+        legs.into_iter()
+            .map(|(length, share)| (PEAK * length / acceleration).sqrt() / share)
+            .fold(0.0, f64::max)
     }
 }

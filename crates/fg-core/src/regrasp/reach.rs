@@ -185,7 +185,12 @@ impl Reach {
     }
 
     /// Adds to `tau`, of all joints, what drives finger `j`, N m.
-    pub fn add_torque(&self, view_of: (&HandModel, &crate::hand::HandState, &crate::grasp::Grasp), j: usize, tau: &mut [f64]) {
+    pub fn add_torque(
+        &self,
+        view_of: (&HandModel, &crate::hand::HandState, &crate::grasp::Grasp),
+        j: usize,
+        tau: &mut [f64],
+    ) {
         let (hand, state, grasp) = view_of;
         if !self.fingers[j].waits {
             self.arms.add_servo(hand, state, j, tau);

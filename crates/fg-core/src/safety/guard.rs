@@ -328,7 +328,13 @@ impl Guard {
         let using = |j: usize| {
             let free = plan.frees(j);
             let drives = motors.drives(j);
-            touch::Use { drives, open: plan.open.is_some(), holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            touch::Use {
+                drives,
+                open: plan.open.is_some(),
+                holding: !free,
+                pressing: free && plan.pressing,
+                f_n: plan.f[3 * j + 2],
+            }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
@@ -377,7 +383,11 @@ impl Guard {
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let strained = conditions.saturated.confirmed() || conditions.overdue.confirmed();
-        let mut mode = if slow || strained || conditions.aground.confirmed() { SafeMode::Hold } else { SafeMode::Normal };
+        let mut mode = if slow || strained || conditions.aground.confirmed() {
+            SafeMode::Hold
+        } else {
+            SafeMode::Normal
+        };
         if self.blind || self.pose.failed() {
             mode = SafeMode::Squeeze;
         }
