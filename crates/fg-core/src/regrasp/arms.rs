@@ -126,7 +126,7 @@ impl Arms {
     /// joints' own drag, N m.
     pub fn add_servo(&self, hand: &HandModel, state: &HandState, j: usize, tau: &mut [f64]) {
         let w = self.bandwidth;
-        self.add(hand, state, j, tau, |at| {
+        add_inertial(hand, state, j, tau, |at| {
             self.qdd_des[at]
                 + 2.0 * w * (self.qd_des[at] - self.qd[at])
                 + w * w * (self.q_des[at] - self.q[at])
@@ -138,17 +138,18 @@ impl Arms {
 
     /// Adds to `tau` what brakes finger `j`: -2 w M qd, N m.
     pub fn add_brake(&self, hand: &HandModel, state: &HandState, j: usize, tau: &mut [f64]) {
-        self.add(hand, state, j, tau, |at| -2.0 * self.bandwidth * self.qd[at]);
-    }
-
-    fn add(&self, hand: &HandModel, state: &HandState, j: usize, tau: &mut [f64], a: impl Fn(usize) -> f64) {
-        let M = state.inertia(hand, j);
-        let joints = hand.joints(j);
-        for (row, at) in joints.clone().enumerate() {
-            tau[at] += joints.clone().enumerate().map(|(column, k)| M[(row, column)] * a(k)).sum::<f64>();
-        }
+        add_inertial(hand, state, j, tau, |at| -2.0 * self.bandwidth * self.qd[at]);
     }
 }
 
 /// Desired joint speed from which dry friction is overcome in full, rad/s.
 const DRAG_SPEED: f64 = 0.05;
+
+/// Adds M a to `tau`, M the inertia of finger `j`, `a` the acceleration of each joint.
+fn add_inertial(hand: &HandModel, state: &HandState, j: usize, tau: &mut [f64], a: impl Fn(usize) -> f64) {
+    let M = state.inertia(hand, j);
+    let joints = hand.joints(j);
+    for (row, at) in joints.clone().enumerate() {
+        tau[at] += joints.clone().enumerate().map(|(column, k)| M[(row, column)] * a(k)).sum::<f64>();
+    }
+}

@@ -57,6 +57,7 @@ pub struct Scale {
 
 /// What the state machine looks at.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub struct View<'a> {
     /// The hand.
     pub hand: &'a HandModel,
@@ -261,18 +262,16 @@ impl Regrasp {
         } else {
             self.freeze(view);
         }
-        if self.phase != Phase::Idle {
-            let lies = self.phase.lies() && self.phase != Phase::Check;
-            let reference = self.governor.reference(view.asked);
-            self.out = match (lies, self.phase) {
-                (true, _) => Reference { X_WD: *view.X_WO, V_WD: Vector6::zeros() },
-                (_, Phase::Check) if before == Phase::Check => self.out,
-                (_, Phase::Check) => Reference { X_WD: *view.X_WO, V_WD: Vector6::zeros() },
-                _ => reference,
-            };
+        self.out = if self.phase == Phase::Idle {
+            *view.asked
         } else {
-            self.out = *view.asked;
-        }
+            let reference = self.governor.reference(view.asked);
+            match self.phase {
+                Phase::Check if before == Phase::Check => self.out,
+                phase if phase.lies() => Reference { X_WD: *view.X_WO, V_WD: Vector6::zeros() },
+                _ => reference,
+            }
+        };
         let entered = |phase| self.phase == phase && before != phase;
         Orders {
             learn: entered(Phase::Lower) && before == Phase::Brake,

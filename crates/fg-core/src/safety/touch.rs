@@ -16,6 +16,7 @@ const ON_ITS_WAY: f64 = 1e-3;
 
 /// What the last step knew about one finger.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub struct Use {
     /// False where the finger's motors give no torque: it lies where it lies.
     pub drives: bool,
