@@ -50,7 +50,8 @@ class LossMonitor:
         """True once the object is lost, from the poses (7,) and the fingertips' normal forces, N.
 
         `standing`: the controller lets the reference stand in this step. From then on only a tilt counts, until the
-        object has caught up with the desired yaw. `lying`: the controller has set the object down, and need not touch it.
+        object has caught up with the desired yaw. `lying`: the controller has set the object down, and need not touch
+        it.
         """
         self._lags = standing or (self._lags and _angle(true.tolist(), desired.tolist()) > ORIENTATION_LIMIT)
         symptom = self._symptom(t, true.tolist(), desired.tolist(), normal_forces, lying)

@@ -23,11 +23,11 @@ _CLEAR = 5e-4  # m above where the object lay at the start, from which on it is 
 def regrasp_metrics(log: Log) -> dict[str, Any] | None:
     """Figures of regrasping, None where there was none.
 
-    `set_downs`; `turned_in_air_rad`: net turn about the vertical while the object is in the air; `dragged_rad`: all turns
-    while it is not, to either side; `duty_in_air`: share of the time in the air, from the first turn on;
-    `max_position_error_in_air_m`, `max_orientation_error_in_air_rad`: against what the object is to do at each moment, while
-    it is held in the air, neither on its way up nor down; `max_drift_on_support_m`: farthest that it moves across its support
-    between one set-down and the next lift; `failed_grasps`; `ended`: the last phase.
+    `set_downs`; `turned_in_air_rad`: net turn about the vertical while the object is in the air; `dragged_rad`: all
+    turns while it is not, to either side; `duty_in_air`: share of the time in the air, from the first turn on;
+    `max_position_error_in_air_m`, `max_orientation_error_in_air_rad`: against what the object is to do at each moment,
+    while it is held in the air, neither on its way up nor down; `max_drift_on_support_m`: farthest that it moves across
+    its support between one set-down and the next lift; `failed_grasps`; `ended`: the last phase.
     """
     phase = log["regrasp"].astype(int)
     begun = np.flatnonzero(phase > 0)

@@ -1,7 +1,7 @@
 """A scenario: plant, reference, disturbances and the errors of the model, read from TOML and checked.
 
-The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
-on as they are, and the core refuses what it doesn't know.
+The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they
+are passed on as they are, and the core refuses what it doesn't know.
 """
 
 import json
