@@ -25,6 +25,7 @@ setup: .venv/.module
 
 demo: setup
 	$(BIN)/fingergait run lift-and-rotate
+	@echo "see it live, and play with it: .venv/bin/fingergait play"
 
 test: setup wheel
 	cargo test --workspace --locked --quiet
@@ -62,7 +63,7 @@ recordings: setup
 	$(RECORD) $(RECORDINGS)/noisy.rec --set duration=6 $(SENSORS:%=--set sensors.%)
 
 reference: setup
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view,peers]'
 	$(BIN)/fingergait bench --out runs/reference
 	cp runs/reference/bench.json models/bench/reference.json
 
@@ -91,7 +92,7 @@ clean:
 # The pinned dependencies are there already, or, on Python 3.10, come with the module by the ranges of pyproject.toml.
 .venv/.module: .venv/.dependencies $(SOURCES)
 	@command -v cargo > /dev/null || $(call missing,a stable Rust toolchain,https://rustup.rs or: apt-get install cargo)
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view]'
 	@touch $@
 
 .venv/.dependencies: requirements.lock pyproject.toml

@@ -3,13 +3,16 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from fingergait._core import FingergaitError
+from fingergait._core import ConfigError, FingergaitError
 from fingergait.scenario import Scenario, parse_override
+
+if TYPE_CHECKING:
+    from fingergait.run.command import Viewer
 
 DONE, MISSED, BAD_INPUT = 0, 1, 2
 
@@ -17,6 +20,9 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 
 Overrides = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a scenario key.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Where the page listens; else the next free port.")]
+Host = Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on; others than this machine see it.")]
 
 
 @app.command()
@@ -29,7 +35,9 @@ def run(
     controller: Annotated[str | None, typer.Option(metavar="FILE", help="Controller artefact, or its name.")] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the results go.")] = None,
     as_json: Json = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer.")] = False,
+    view: Annotated[
+        str | None, typer.Option("--view", metavar="[=native]", help="Show it live, in the browser or MuJoCo's window.")
+    ] = None,
     video: Annotated[Path | None, typer.Option(metavar="FILE.mp4", help="Write a video.")] = None,
 ) -> None:
     """Run a scenario; write its log, plots and film strip."""
@@ -41,10 +49,41 @@ def run(
     if no_gait:
         overrides["gait.enabled"] = False
     loaded = Scenario.load(scenario, overrides)
-    metrics = run_scenario(loaded, out, view, video, quiet=as_json)
+    metrics = run_scenario(loaded, out, _viewer(view), video, quiet=as_json)
     if as_json:
         print_json(metrics)
     raise typer.Exit(MISSED if metrics["dropped"] else DONE)
+
+
+@app.command()
+def play(
+    scenario: Annotated[str, typer.Argument(help="A packaged scenario's name, or a TOML file.")] = "lift-and-rotate",
+    set_: Overrides = None,
+    port: Port = 8080,
+    host: Host = "127.0.0.1",
+) -> None:
+    """Play with a scenario in the browser: drag the object, push it, cut a finger's power, and see why."""
+    from fingergait.view.play import play as serve
+
+    serve(Scenario.load(scenario, dict(map(parse_override, set_ or []))), host, port)
+
+
+@app.command()
+def show(
+    log: Annotated[Path, typer.Argument(metavar="LOG.parquet", help="The log of a run.")],
+    port: Port = 8080,
+    host: Host = "127.0.0.1",
+    rerun: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write it for rerun, show nothing.")] = None,
+) -> None:
+    """Show a recorded run in the browser, with a time bar."""
+    if rerun is not None:
+        from fingergait.view.rerun import export
+
+        typer.echo(f"{rerun}: {export(log, rerun)} pictures")
+    else:
+        from fingergait.view.show import show as serve
+
+        serve(log, host, port)
 
 
 @app.command()
@@ -155,6 +194,20 @@ def check(
     typer.echo(describe_file(file))
 
 
+def _viewer(kind: str | None) -> "Viewer | None":
+    from fingergait.run.command import NativeViewer
+
+    if kind is None:
+        return None
+    if kind == "native":
+        return NativeViewer()
+    if kind == "page":
+        from fingergait.view.live import LivePage
+
+        return LivePage()
+    raise ConfigError(f"--view: expected nothing, or --view=native, found {kind!r}")
+
+
 def print_json(value: object) -> None:
     """Writes one JSON object to standard output."""
     print(json.dumps(value, indent=2, allow_nan=False))
@@ -163,7 +216,8 @@ def print_json(value: object) -> None:
 def main() -> None:
     """Entry point: errors made on purpose are one line on standard error and exit status 2."""
     try:
-        app()
+        # An option whose value may be left out, which Typer doesn't have.
+        app(["--view=page" if argument == "--view" else argument for argument in sys.argv[1:]])
     except FingergaitError as error:
         print(f"fingergait: {error}", file=sys.stderr)
         sys.exit(BAD_INPUT)

@@ -5,6 +5,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,13 @@ from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
 from fingergait.sim.plant import MujocoPlant
 
+Viewer = contextlib.AbstractContextManager[Callable[[MujocoPlant, Log], bool]]
+"""Shows a run in real time: called at every control step, True ends the run."""
 
-def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool) -> dict[str, Any]:
+
+def run_scenario(
+    scenario: Scenario, out: Path | None, view: Viewer | None, video: Path | None, quiet: bool
+) -> dict[str, Any]:
     """Runs a scenario and writes log.parquet, metrics.json, the plots and film.png; its metrics.
 
     Parameters
@@ -32,7 +38,7 @@ def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path |
     out
         Folder of the results; absent: runs/<scenario>-<seed>.
     view
-        Show the run in MuJoCo's viewer, in real time.
+        Shows the run in real time: `NativeViewer`, or the page `fingergait.view.live.LivePage`.
     video
         File of a video to write.
     quiet
@@ -47,7 +53,7 @@ def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path |
         raise ConfigError(f"--out: expected a folder that can be written, found {folder} ({error.strerror})") from None
     notes = Console(stderr=True, highlight=False)
     with _Watch(scenario, view) as watch:
-        result = simulate(scenario, watch)
+        result = simulate(scenario, watch, every=0.016 if view is None else 0.0)
     metrics = result.metrics
     log = folder / "log.parquet"
     metrics["log"] = str(log)
@@ -76,9 +82,9 @@ def _check_video(video: Path) -> None:
 class _Watch:
     """A progress bar on standard error and, if wanted, the viewer; called by `simulate`."""
 
-    def __init__(self, scenario: Scenario, view: bool) -> None:
-        self._scenario, self._view = scenario, view
-        self._viewer: Any = None
+    def __init__(self, scenario: Scenario, view: Viewer | None) -> None:
+        self._view = view
+        self._viewer: Callable[[MujocoPlant, Log], bool] | None = None
         self._stack = contextlib.ExitStack()
         columns = (
             TextColumn("{task.description}"),
@@ -93,7 +99,8 @@ class _Watch:
 
     def __enter__(self) -> "_Watch":
         self._stack.enter_context(self._progress)
-        self._begin = time.perf_counter()
+        if self._view is not None:
+            self._viewer = self._stack.enter_context(self._view)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -106,24 +113,42 @@ class _Watch:
             self._shown = now
             state = f"{int(log.last('gaits'))} gaits, Q {log.last('Q'):.5f}"
             self._progress.update(self._task, completed=max(0.0, plant.t), state=state)
-        if not self._view:
-            return False
+        return self._viewer is not None and self._viewer(plant, log)
+
+
+class NativeViewer(contextlib.ExitStack):
+    """MuJoCo's own window, held to real time; closing it ends the run."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._viewer: Any = None
+
+    def __enter__(self) -> "NativeViewer":
+        return self
+
+    def __call__(self, plant: MujocoPlant, log: Log) -> bool:
+        """Shows the present state about 60 times a second; True when the window has been closed."""
         if self._viewer is None:
-            self._viewer = self._stack.enter_context(_open_viewer(plant))
-        if not self._viewer.is_running():
-            return True
-        self._viewer.sync()
-        ahead = plant.t + self._scenario.grasp.settle - (time.perf_counter() - self._begin)
-        time.sleep(max(0.0, ahead))
+            self._viewer = self.enter_context(_open_viewer(plant))
+            self._begin, self._shown = time.perf_counter() - plant.t, 0.0
+        now = time.perf_counter()
+        if now - self._shown > 0.016:
+            self._shown = now
+            if not self._viewer.is_running():
+                return True
+            self._viewer.sync()
+        time.sleep(max(0.0, plant.t - (now - self._begin) - 0.008))
         return False
 
 
 def _open_viewer(plant: MujocoPlant) -> Any:
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ConfigError("--view: expected a display, found neither DISPLAY nor WAYLAND_DISPLAY set")
+        raise ConfigError("--view=native: expected a display, found neither DISPLAY nor WAYLAND_DISPLAY set")
     try:
         import mujoco.viewer
 
         return mujoco.viewer.launch_passive(plant.scene.model, plant.data, show_left_ui=False, show_right_ui=False)
     except (ImportError, RuntimeError) as error:
-        raise ConfigError(f"--view: expected a display that MuJoCo's viewer can open, found none ({error})") from None
+        raise ConfigError(
+            f"--view=native: expected a display that MuJoCo's viewer can open, found none ({error})"
+        ) from None

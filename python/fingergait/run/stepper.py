@@ -59,6 +59,12 @@ class Stepper:
         """Time of the measurement that the next `plan` answers, s."""
         return self.plant.t
 
+    @property
+    def offset(self) -> NDArray[np.float64]:
+        """How far `pose` has been steered from the scenario's own reference, (6,), m and rad."""
+        steering = self._trajectory.steering
+        return steering.offset[0] if steering is not None else np.zeros(6)
+
     def plan(self) -> _core.Diagnostics:
         """Answers the newest measurement: the inputs that are due, the reference, the control step."""
         plant = self.plant
