@@ -34,9 +34,10 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
-def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000, scale: float = 1.0) -> Any:
-    """The page at `address`, drawn, in a window of so many pixels; `scale`: of its resolution."""
-    page = chromium.new_page(viewport={"width": width, "height": height}, device_scale_factor=scale)
+def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000) -> Any:
+    """The page at `address`, drawn, in a window of so many pixels."""
+    page = chromium.new_page(viewport={"width": width, "height": height})
+    page.set_default_timeout(90_000)  # software draws the scene
     page.goto(address)
     page.wait_for_selector("canvas")
     page.get_by_text("All hold").or_(page.get_by_text("fingers have")).or_(
