@@ -51,9 +51,17 @@ def address(page: Page) -> str:
     return f"http://127.0.0.1:{page.server.get_port()}"
 
 
+@pytest.fixture(autouse=True)
+def going(playing: tuple[Session, Page, Path]) -> Iterator[None]:
+    """A test that fails doesn't leave the bench standing."""
+    yield
+    playing[0].pacer.pause(False)
+
+
 def tab_of(chromium: Any, page: Page) -> Any:
     """The page in a small tab of its own: the CPU draws the scene."""
     page.server.scene.configure_default_lights(cast_shadow=False)
+    page.server.scene.configure_environment_map(None)
     return open_page(chromium, address(page), 1040, 420)
 
 
@@ -67,7 +75,7 @@ def until(true: Callable[[], bool], timeout: float = 60.0) -> None:
 def picture(page: Page) -> NDArray[np.int16]:
     """The scene as a browser draws it now."""
     client = next(iter(page.server.get_clients().values()))
-    return np.asarray(client.get_render(height=180, width=240))[:, :, :3].astype(np.int16)
+    return np.asarray(client.get_render(height=120, width=160))[:, :, :3].astype(np.int16)
 
 
 def difference(page: Page) -> float:
@@ -78,6 +86,7 @@ def difference(page: Page) -> float:
 
 
 def newest(session: Session, name: str) -> NDArray[np.float64]:
+    until(lambda: session.history.row() is not None)  # a run that begins anew has none for a moment
     row = session.history.row()
     assert row is not None
     return row.group(name)
@@ -101,9 +110,8 @@ def test_the_object_turns_and_stands_while_paused(playing: tuple[Session, Page, 
     moving = difference(playing[1])
     tab.get_by_role("button", name="pause", exact=True).click()
     until(lambda: session.pacer.paused)
-    time.sleep(1.0)
-    still = difference(playing[1])
-    assert moving > 0.005 and still < 0.2 * moving
+    assert moving > 0.005
+    until(lambda: difference(playing[1]) < 0.1 * moving)  # the CPU draws: the picture may come late
     tab.get_by_role("button", name="go on", exact=True).click()
     until(lambda: not session.pacer.paused)
     assert tab.errors == []
@@ -111,8 +119,6 @@ def test_the_object_turns_and_stands_while_paused(playing: tuple[Session, Page, 
 
 def test_a_push_moves_the_error_plot(playing: tuple[Session, Page, Path], tab: Any) -> None:
     session, page, _ = playing
-    row = session.history.row()
-    assert row is not None
     until(lambda: float(newest(session, "object")[2]) > 0.07)  # it has been lifted
     before = error(page)
     chart = tab.locator(".uplot canvas").first
@@ -199,7 +205,9 @@ def test_two_pages_share_the_bench_and_closing_them_ends_nothing(
     session, page, _ = playing
     other = tab_of(chromium, page)
     until(lambda: len(page.server.get_clients()) == 2)
-    assert difference(page) > 0.0
+    clock = other.get_by_text("gaits")  # in the line that begins with the time
+    said = clock.inner_text()
+    until(lambda: clock.inner_text() != said)
     press(other, "push", "-x")
     until(lambda: len(session.inputs.record) > 3)
     other.close()

@@ -39,6 +39,7 @@ def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000
     page = chromium.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(90_000)  # software draws the scene
     page.goto(address)
+    page.add_style_tag(content="[class*=Notification] { display: none }")  # that software draws the scene
     page.wait_for_selector("canvas")
     page.get_by_text("All hold").or_(page.get_by_text("fingers have")).or_(
         page.get_by_text("to spare")
@@ -56,8 +57,6 @@ def screenshot(scenario: Scenario, out: Path, after: float) -> None:
         while (row := session.history.row()) is None or row.t < after:
             time.sleep(0.1)
         session.pacer.pause(True)
-        for notice in shown.locator(".mantine-Notification-closeButton").all():
-            notice.click()
         time.sleep(1.0)
         out.parent.mkdir(parents=True, exist_ok=True)
         shown.screenshot(path=str(out))
