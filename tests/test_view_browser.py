@@ -62,6 +62,8 @@ def tab_of(chromium: Any, page: Page) -> Any:
     """The page in a small tab of its own: the CPU draws the scene."""
     page.server.scene.configure_default_lights(cast_shadow=False)
     page.server.scene.configure_environment_map(None)
+    for name, switch in page.overlays.switches.items():
+        switch.value = name == "forces"
     return open_page(chromium, address(page), 1040, 420)
 
 

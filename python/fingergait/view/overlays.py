@@ -38,11 +38,16 @@ class Overlays:
         Whose model and size the overlays fit.
     scenario
         Whose friction pyramids they are.
+
+    Attributes
+    ----------
+    switches
+        The checkbox of each overlay.
     """
 
     def __init__(self, server: viser.ViserServer, pose: Pose, scenario: Scenario) -> None:
         self._server, self._names = server, list(_NAMES)
-        self._switch = {key: server.gui.add_checkbox(label, on) for key, (label, on) in _NAMES.items()}
+        self.switches = {key: server.gui.add_checkbox(label, on) for key, (label, on) in _NAMES.items()}
         force = {**_core.default_config()["force"], **scenario.force}
         angle = 2.0 * np.pi * np.arange(int(force["edges"])) / int(force["edges"])
         self._rim = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -80,7 +85,7 @@ class Overlays:
 
     def update(self, pose: Pose) -> None:
         """Draws the overlays that are switched on."""
-        on = {key: bool(switch.value) for key, switch in self._switch.items()}
+        on = {key: bool(switch.value) for key, switch in self.switches.items()}
         felt = np.flatnonzero(pose.touching)
         self._draw_forces(pose, felt, on)
         self._draw_quality(pose, felt, on["quality"])
