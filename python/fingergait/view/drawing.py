@@ -49,7 +49,7 @@ class Drawing:
         )
         self._object = scene.object_body
         self.centre, self.size = _frame(scene, start)
-        distance = 1.05 * self.size / np.sin(0.5 * _FOV)
+        distance = 1.12 * self.size / np.sin(0.5 * _FOV)
         direction = np.array(
             [np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)]
         )

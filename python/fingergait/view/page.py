@@ -1,5 +1,6 @@
 """The page: scene, overlays, plots and words of a history, in threads that never make the simulation wait."""
 
+import math
 import sys
 import threading
 import time
@@ -80,6 +81,7 @@ class Page:
             self.overlays = Overlays(server, self._pose, scenario)
         panel.dock_left()
         panel.set_width(340)
+        self._drawn = self._plotted = math.nan  # time of the row that the scene and the plots show
         self.ticks: list[Tick] = []
         self.lost: Callable[[], str | None] = lambda: None
         self.failure: Exception | None = None
@@ -131,12 +133,15 @@ class Page:
             return
         pose = self._pose
         pose.update(row)
-        self.drawing.update(pose.data)
+        if row.t != self._drawn:  # a run that stands costs the browser nothing
+            self._drawn = row.t
+            self.drawing.update(pose.data)
         for tick in self.ticks:
             tick(pose)
         if count % _OVERLAYS == 0:
             self.overlays.update(pose)
-        if count % _PLOTS == 1:
+        if count % _PLOTS == 1 and row.t != self._plotted:
+            self._plotted = row.t
             self.plots.update()
         if count % _WORDS == 2:
             self._say(pose)

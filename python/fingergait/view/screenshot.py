@@ -15,6 +15,8 @@ from fingergait.view.play import bench
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _FLAGS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
+_SETTLED = 12.0  # s in which the browser has faded the scene in, and drawn the last of it
+
 
 @contextlib.contextmanager
 def browser() -> Iterator[Any]:
@@ -34,7 +36,7 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
-def open_page(chromium: Any, address: str, width: int = 1600, height: int = 1000) -> Any:
+def open_page(chromium: Any, address: str, width: int = 1500, height: int = 940) -> Any:
     """The page at `address`, drawn, in a window of so many pixels."""
     page = chromium.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(90_000)  # software draws the scene
@@ -51,13 +53,14 @@ def screenshot(scenario: Scenario, out: Path, after: float) -> None:
     """Writes a picture of the bench after so many seconds, shortly after a push."""
     with bench(scenario, "127.0.0.1", 8080) as (session, page), browser() as chromium:
         shown = open_page(chromium, f"http://127.0.0.1:{page.server.get_port()}")
-        while (row := session.history.row()) is None or row.t < after - 2.0:
-            time.sleep(0.1)
-        session.inputs.push("+x", 5.0)
         while (row := session.history.row()) is None or row.t < after:
             time.sleep(0.1)
+        session.inputs.push("+x", 5.0)
+        pushed = row.t
+        while (row := session.history.row()) is None or row.t < pushed + 1.5:
+            time.sleep(0.02)
         session.pacer.pause(True)
-        time.sleep(1.0)
+        time.sleep(_SETTLED)
         out.parent.mkdir(parents=True, exist_ok=True)
         shown.screenshot(path=str(out))
 

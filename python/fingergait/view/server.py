@@ -45,7 +45,7 @@ def open_server(title: str, host: str = HOST, port: int = PORT, show: bool = Tru
     """
     require()
     notes = Console(stderr=True, highlight=False)
-    rich.reconfigure(stderr=True)  # the server's own messages: standard output is for results
+    rich.reconfigure(quiet=True)  # the server's own banner: standard output is for results
     free = _free_port(host, port)
     if free != port:
         notes.print(f"port {port} is in use; taking {free}", style="yellow")
