@@ -197,7 +197,7 @@ def joint_name(model: mujoco.MjModel, joint: int) -> str:
 
 
 def _kind(model: mujoco.MjModel, geom: int) -> str:
-    return mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower()
+    return str(mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower())
 
 
 def _label(model: mujoco.MjModel, geom: int) -> str:

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from fingergait._core import ConfigError
 from fingergait.hand import geom_name
 from fingergait.scenario import Scenario
+from fingergait.sim.press import holding_torques, independent
 from fingergait.sim.scene import OBJECT, SceneModel, torque_limits
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
         _set_joints(scene, data, np.array(scenario.grasp.joints))
         mujoco.mj_kinematics(model, data)
         _check_clear(scene, data)
-        return Start(data.qpos.copy(), _hold(scene, data, middle, scenario.grasp.press))
+        return Start(data.qpos.copy(), _held(scene, data, scenario.grasp.press))
     tips = data.geom_xpos[scene.tips] - data.geom_xpos[scene.tips].mean(axis=0)
     for index in range(n):
         azimuth = np.arctan2(tips[index, 1], tips[index, 0]) + turns[index]
@@ -75,7 +76,7 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
         _reach(scene, data, index, target)
     mujoco.mj_kinematics(model, data)
     _check_clear(scene, data)
-    return Start(data.qpos.copy(), _hold(scene, data, middle, scenario.grasp.press))
+    return Start(data.qpos.copy(), _held(scene, data, scenario.grasp.press))
 
 
 def _per_finger(values: tuple[float, ...], n: int, field: str) -> Array:
@@ -172,7 +173,7 @@ def _reach(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) ->
         if np.linalg.norm(error) < _TOLERANCE:
             return
         mujoco.mj_jac(model, data, jacobian, None, data.geom_xpos[tip], body)
-        J = _independent(scene, jacobian)[:, scene.joints[index]]  # (3, n_joints)
+        J = independent(scene, jacobian)[:, scene.joints[index]]  # (3, n_joints)
         step = J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(3), error)
         moved = data.qpos[scene.q].copy()
         moved[scene.joints[index]] = np.clip(data.qpos[q] + np.clip(step, -0.3, 0.3), lower, upper)
@@ -211,16 +212,6 @@ def _touch_near(scene: SceneModel, data: mujoco.MjData, index: int, target: Arra
         )
 
 
-def _independent(scene: SceneModel, columns: Array) -> Array:
-    """Columns (..., nv) of all joints as those (..., n_q) of the independent ones, which move their followers."""
-    dofs = scene.model.jnt_dofadr
-    out: Array = columns[..., scene.v].copy()
-    place = {int(dof): k for k, dof in enumerate(scene.v)}
-    for coupling in scene.hand.couplings.values():
-        out[..., place[int(dofs[coupling.leader])]] += coupling.ratio * columns[..., dofs[coupling.follower]]
-    return out
-
-
 def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
     """Refuses an object that stands in a finger's link."""
     model = scene.model
@@ -236,22 +227,8 @@ def _check_clear(scene: SceneModel, data: mujoco.MjData) -> None:
                 raise ConfigError(f"object.size: expected an object that leaves the fingers room, found {found}")
 
 
-def _hold(scene: SceneModel, data: mujoco.MjData, middle: Array, press: float) -> Array:
-    """Torques that hold the fingers' weight and press each tip towards the object's axis with the force `press`, N."""
-    model = scene.model
-    mujoco.mj_forward(model, data)
-    # At rest: gravity, and the springs of the joints.
-    torque = _independent(scene, data.qfrc_bias - data.qfrc_spring)
-    jacobian = np.zeros((3, model.nv))
-    for index, finger in enumerate(scene.fingers):
-        centre = data.geom_xpos[finger.probe]
-        inward = middle - centre
-        # Along the horizontal, so that the fingers together neither lift nor push down.
-        inward[2] = 0.0
-        mujoco.mj_jac(model, data, jacobian, None, centre, int(model.geom_bodyid[finger.probe]))
-        own = scene.joints[index]
-        norm = max(float(np.linalg.norm(inward)), 1e-9)
-        torque[own] += _independent(scene, jacobian)[:, own].T @ (press * inward / norm)
+def _held(scene: SceneModel, data: mujoco.MjData, press: float) -> Array:
+    torque = holding_torques(scene, data, press)
     _check_torques(scene, torque)
     return torque
 
