@@ -43,13 +43,13 @@ def motor_of(model: mujoco.MjModel, joint: int, tendons: dict[int, float], facts
         limits = _force_limits(model, actuator, notes)
         a, b = sorted((limits[0] * gear, limits[1] * gear))
         low, high, lag = low + a, high + b, max(lag, _lag(model, actuator))
-    stated = "forcerange, ctrlrange and gear"
+    stated, capped = "forcerange, ctrlrange and gear", False
     if not drives:
         low, high = -np.inf, np.inf
     if model.jnt_actfrclimited[joint]:
         a, b = map(float, model.jnt_actfrcrange[joint])
-        if a > low or b < high:
-            stated = "actuatorfrcrange"
+        if drives and (a > low or b < high):
+            stated, capped = "actuatorfrcrange", True
         low, high = max(low, a), min(high, b)
     where = f"the motor {', '.join(_actuator_name(model, a) for a in drives)}" if drives else f"the joint {name}"
     remedy = f"write in the facts file: torque = <N m> for all motors, or [joints.{name}] torque = <N m>"
@@ -74,7 +74,7 @@ def motor_of(model: mujoco.MjModel, joint: int, tendons: dict[int, float], facts
         return None
     if len(drives) > 1:
         notes.change(f"{name}: its {len(drives)} actuators become one torque motor")
-    if any(abs(gear_at(model, a, joint)) != 1.0 or _narrow(model, a) for a in drives):
+    if capped or any(abs(gear_at(model, a, joint)) != 1.0 or _narrow(model, a) for a in drives):
         notes.change(f"{name}: {low:g} to {high:g} N m at the joint, by {stated}")
     return Motor(float(low), float(high), float(own.lag if own.lag is not None else lag))
 

@@ -13,6 +13,7 @@ _EDGES = 8  # of the friction pyramids
 _FRICTION_SHARE = 0.8  # of the true friction, that the start uses
 _RIDGE = 1e-3  # against large forces where small ones do
 _SHORT = 0.02  # share of the weight that the contacts may fail to carry before the press alone is taken
+_RESTS = 1e-4  # m: nearer than this the object lies on what is not a fingertip
 _LENGTH = 0.03  # m: what counts a torque against a force
 
 
@@ -52,15 +53,12 @@ def independent(scene: SceneModel, columns: Array) -> Array:
 
 
 def _carrying(scene: SceneModel, data: mujoco.MjData, press: float) -> Array | None:
-    """Forces (n, 3) in W of the tips that carry the object's weight; None where it rests on something, or they can't."""
+    """Forces (n, 3) in W of the tips that carry the object; None where it rests on something, or they cannot."""
     model, object_geom = scene.model, int(scene.model.geom(OBJECT).id)
     tips = {finger.tip for finger in scene.fingers}
-    touching = [
-        set(map(int, contact.geom)) - {object_geom}
-        for contact in data.contact[: data.ncon]
-        if object_geom in contact.geom
-    ]
-    if any(not others <= tips for others in touching):
+    others = [g for g in range(model.ngeom) if model.geom_contype[g] and g not in tips and g != object_geom]
+    near = (mujoco.mj_geomDistance(model, data, g, object_geom, 0.1, None) for g in others)
+    if min(near, default=1.0) < _RESTS:
         return None
     weight = -model.body_mass[scene.object_body] * model.opt.gravity
     if not np.any(weight):
