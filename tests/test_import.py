@@ -234,8 +234,10 @@ def test_a_urdf_with_mimic_joints_becomes_a_hand(tmp_path: Path) -> None:
     def finger(k: int) -> str:
         links = "".join(
             f'<link name="l{k}{i}"><inertial><mass value="0.02"/><origin xyz="0.02 0 0"/>'
-            '<inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0.04 0 0"/><geometry>'
-            '<sphere radius="0.008"/></geometry></collision></link>'
+            '<inertia ixx="1e-5" iyy="1e-5" izz="1e-5" ixy="0" ixz="0" iyz="0"/></inertial>'
+            '<visual><geometry><mesh filename="package://none/seen.dae"/></geometry></visual>'
+            '<collision><origin xyz="0.04 0 0"/><geometry><mesh filename="package://pads/ball.obj"/></geometry></collision>'
+            "</link>"
             for i in range(3)
         )
         parents = ["base", f"l{k}0", f"l{k}1"]
@@ -248,7 +250,13 @@ def test_a_urdf_with_mimic_joints_becomes_a_hand(tmp_path: Path) -> None:
         )
         return links + joints
 
-    path = tmp_path / "hand.urdf"
+    ball = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    (tmp_path / "pads").mkdir()
+    (tmp_path / "urdf").mkdir()
+    lines = [f"v {0.008 * x} {0.008 * y} {0.008 * z}" for x, y, z in ball]
+    faces = ["f 1 2 3", "f 2 4 3", "f 5 7 6", "f 6 7 8", "f 1 5 2", "f 2 5 6", "f 3 4 7", "f 4 8 7", "f 1 3 5"]
+    (tmp_path / "pads" / "ball.obj").write_text("\n".join([*lines, *faces, "f 3 7 5", "f 2 6 4", "f 4 6 8"]))
+    path = tmp_path / "urdf" / "hand.urdf"
     path.write_text(f'<robot name="r"><link name="base"/>{"".join(map(finger, range(3)))}</robot>')
     hand = import_hand(path)
     assert [len(finger.joints) for finger in hand.fingers] == [2, 2, 2]

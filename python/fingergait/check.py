@@ -6,10 +6,13 @@ from typing import Any
 import numpy as np
 
 from fingergait._core import ArtifactError, ConfigError, Controller, DualStagePlanner, HandModel
-from fingergait.hand import Hand, HandError, import_hand, model_json, shown
+from fingergait.hand import Hand, HandError, model_json, shown
 from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario
+from fingergait.scenario.core_config import core_config
 from fingergait.sim.plant import MujocoPlant
+from fingergait.sim.scene import SceneModel, build_scene
+from fingergait.sim.start import nominal_start
 
 
 def check_file(file: Path, facts: Path | None = None) -> dict[str, Any]:
@@ -23,7 +26,7 @@ def check_file(file: Path, facts: Path | None = None) -> dict[str, Any]:
         expected = "a scenario (.toml), a controller (.json) or a hand (.xml, .urdf)"
         raise ConfigError(f"FILE: expected {expected}, found {shown(file)}")
     if not file.is_file():
-        raise ConfigError(f"FILE: expected a file, found nothing at {shown(file)}")
+        raise ConfigError(f"FILE: expected a file, found nothing at {file}")
     try:
         return kind(file, facts)
     except HandError as error:
@@ -76,8 +79,12 @@ def _controller(file: Path, facts: Path | None) -> dict[str, Any]:
 
 
 def _hand(file: Path, facts: Path | None) -> dict[str, Any]:
-    hand = import_hand(file, facts)
-    HandModel(model_json(hand))
+    values = {"name": "check", "hand": {"file": str(file), "facts": None if facts is None else str(facts)}}
+    scenario = Scenario.build(values)
+    scene = build_scene(scenario)
+    hand = scene.hand
+    DualStagePlanner(HandModel(model_json(hand)), load_controller(scenario), core_config(scenario))
+    warnings = [*hand.warnings, *_start_problems(scene, scenario)]
     lines = [f"{shown(file)}: a valid hand of {len(hand.fingers)} fingers"]
     for finger in hand.fingers:
         joints = ", ".join(
@@ -90,8 +97,18 @@ def _hand(file: Path, facts: Path | None) -> dict[str, Any]:
         tip = f"tip radius {1e3 * sphere.radius:.2f} mm, off by {1e3 * sphere.error:.2f} mm at most"
         lines.append(f"{finger.name}: {tip}; {joints}")
     lines += [f"changed: {change}" for change in hand.changes]
-    lines += [f"warning: {warning}" for warning in hand.warnings]
-    return _result("hand", lines, fingers=_fingers(hand), changes=list(hand.changes), warnings=list(hand.warnings))
+    lines += [f"warning: {warning}" for warning in warnings]
+    return _result("hand", lines, fingers=_fingers(hand), changes=list(hand.changes), warnings=warnings)
+
+
+def _start_problems(scene: SceneModel, scenario: Scenario) -> list[str]:
+    """What keeps a scenario that says nothing of object and grasp from starting with this hand."""
+    o = scenario.object
+    try:
+        nominal_start(scene, scenario)
+    except ConfigError as error:
+        return [f"the default object ({o.shape} {list(o.size)} m on the palm) can't be grasped as it stands: {error}"]
+    return []
 
 
 def _fingers(hand: Hand) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from fingergait.hand.placing import name_everything, place
 from fingergait.hand.rewrite import OURS, rewrite
 from fingergait.hand.standing import part_what_stands_in_each_other
 from fingergait.hand.tips import TipSphere, fit_tip
+from fingergait.hand.urdf import urdf_spec
 
 Array = NDArray[np.float64]
 
@@ -61,6 +62,8 @@ class Hand:
 def load_spec(path: Path) -> mujoco.MjSpec:
     """The MJCF or URDF at `path`, parsed; a parse error is one line that names the file."""
     try:
+        if path.suffix.lower() == ".urdf":
+            return urdf_spec(path, shown(path))
         # As bytes: the path may not be UTF-8.
         return mujoco.MjSpec.from_file(os.fsencode(path))
     except (ValueError, OSError) as error:
