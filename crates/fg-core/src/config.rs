@@ -192,7 +192,7 @@ pub struct ForceConfig {
     pub tau_rate_max: f64,
     /// Which solver answers first.
     pub solver: SolverChoice,
-    /// KKT residual up to which an answer is certified, N.
+    /// KKT residual up to which an answer is certified, relative to its largest contact force.
     pub tolerance: f64,
     /// Lower the assumed friction while fingers slip. Deviation: the paper relocates the slipping finger only.
     pub adapt_friction: bool,
@@ -221,7 +221,7 @@ impl Default for ForceConfig {
             f_n_max: 25.0,
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
-            tolerance: 1e-7,
+            tolerance: 1e-8,
             adapt_friction: true,
             slip_speed: 0.012,
             slip_factor: 0.9,

@@ -167,7 +167,8 @@ impl ForceSolution {
     fn solver(&self) -> &'static str {
         self.core.solver.as_str()
     }
-    /// KKT residual, N; for held forces their worst violation of a bound.
+    /// KKT residual, N; for held forces as well, then never zero: their worst violation of a bound or their distance from a
+    /// minimiser, whichever is larger.
     #[getter]
     fn kkt(&self) -> f64 {
         self.core.kkt
