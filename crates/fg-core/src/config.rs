@@ -158,7 +158,7 @@ impl Default for GaitConfig {
             slack_force: 0.4,
             slack_torque: 0.0125,
             abort_factor: 4.0,
-            overdue_margin: 1.5e-3,
+            overdue_margin: 1.2e-3,
             overdue_time: 0.3,
             contact_force: 0.01,
         }
