@@ -208,7 +208,7 @@ def test_mistakes_are_named_and_forgotten(change: dict[str, Any], error: type[Ex
         (np.zeros((3, 4)), ALPHA, "active_set", r"edges: expected shape \(n, 3, m\), found \(3, 4\)"),
         (np.zeros((2, 3, 4)), ALPHA, "active_set", r"edges\[0\]"),
         (np.stack([pyramid(0.5, 13)] * 2), ALPHA, "active_set", r"edges: expected 3 to 12 edges, found 13"),
-        (np.stack([pyramid(0.5, 4)] * 6), ALPHA, "active_set", r"expected 1 to 5 contacts, found 6"),
+        (np.stack([pyramid(0.5, 4)] * 7), ALPHA, "active_set", r"expected 1 to 6 contacts, found 7"),
         (np.stack([pyramid(0.5, 4)] * 3), (0.0, 0.0, 1.0), "active_set", r"alpha"),
         (np.stack([pyramid(0.5, 4)] * 3), (1.0, 1.0), "active_set", r"alpha: expected shape \(3,\)"),
         (np.stack([pyramid(0.5, 4)] * 3), ALPHA, "osqp", r"solver: expected .*clarabel.*, found osqp"),

@@ -142,7 +142,7 @@ impl Default for GaitConfig {
             project_rate_box: true,
             delta: 1e-5,
             K_v: None,
-            velocity_bandwidth: 10.0,
+            velocity_bandwidth: 4.0,
             velocity_filter: 0.005,
             K_f: 1.5,
             f_des: 0.15,

@@ -135,6 +135,7 @@ def _finger_spec(model: mujoco.MjModel, finger: Finger) -> dict[str, object]:
             last = joint == first + count - 1
             mass, com = _welded_mass(model, body) if last else (0.0, np.zeros(3))
             lower, upper = model.jnt_range[joint]
+            actuator = finger.actuators[finger.joints.index(joint)]
             links.append(
                 {
                     "name": _joint_name(model, joint),
@@ -147,6 +148,7 @@ def _finger_spec(model: mujoco.MjModel, finger: Finger) -> dict[str, object]:
                     "damping": float(model.dof_damping[model.jnt_dofadr[joint]]),
                     "mass": mass,
                     "com": com.tolist(),
+                    **_torque_limits(model, actuator),
                 }
             )
             position, quaternion = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
@@ -154,6 +156,14 @@ def _finger_spec(model: mujoco.MjModel, finger: Finger) -> dict[str, object]:
     centre, _ = _compose(position, quaternion, model.geom_pos[finger.tip], model.geom_quat[finger.tip])
     tip = {"position": centre.tolist(), "radius": float(model.geom_size[finger.tip, 0])}
     return {"name": finger.name, "joints": links, "tip": tip}
+
+
+def _torque_limits(model: mujoco.MjModel, actuator: int) -> dict[str, float]:
+    """The motor's limits, N m, where the MJCF states them."""
+    if not model.actuator_forcelimited[actuator]:
+        return {}
+    low, high = model.actuator_forcerange[actuator]
+    return {"tau_min": float(low), "tau_max": float(high)}
 
 
 def last_link(model: mujoco.MjModel, finger: Finger) -> int:
