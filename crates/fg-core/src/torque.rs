@@ -4,10 +4,16 @@ use crate::config::TorqueConfig;
 use crate::error::Error;
 use crate::hand::TorqueLimits;
 
+/// Share of the torque limit from which on a motor that is told a torque is expected to answer ...
+const TOLD: f64 = 0.05;
+/// ... with at least this share of it.
+const ANSWER: f64 = 0.25;
+
 /// Drives measured joint torques to desired ones. One instance serves all joints.
 ///
 /// `tau_motor = tau_des + K_p e + K_i int(e) + K_d de/dt`, e = tau_des - tau, clipped to the torque limit; the integral
-/// stands still while the output is clipped. A reading that is not finite leaves the feedforward alone.
+/// stands still while the output is clipped, and while the motor gives next to nothing of what it is told: what would
+/// wind up while it has no power would come out once it has. A reading that is not finite leaves the feedforward alone.
 #[derive(Debug, Clone)]
 pub struct TorquePid {
     config: TorqueConfig,
@@ -16,6 +22,8 @@ pub struct TorquePid {
     integral: Vec<f64>,
     derivative: Vec<f64>,
     previous: Vec<Option<f64>>,
+    /// What the motors were told last, N m.
+    told: Vec<f64>,
 }
 
 impl TorquePid {
@@ -25,8 +33,9 @@ impl TorquePid {
             return Err(Error::config("dt", "a period > 0 s", dt));
         }
         let n = limits.n();
-        let (integral, derivative, previous) = (vec![0.0; n], vec![0.0; n], vec![None; n]);
-        Ok(Self { config: config.clone(), limits, dt, integral, derivative, previous })
+        let zeros = vec![0.0; n];
+        let (integral, derivative, told, previous) = (zeros.clone(), zeros.clone(), zeros, vec![None; n]);
+        Ok(Self { config: config.clone(), limits, dt, integral, derivative, previous, told })
     }
 
     /// Number of joints.
@@ -39,6 +48,7 @@ impl TorquePid {
         self.integral.fill(0.0);
         self.derivative.fill(0.0);
         self.previous.fill(None);
+        self.told.fill(0.0);
     }
 
     /// Writes the motor torques, N m, for the desired and the measured joint torques.
@@ -51,6 +61,7 @@ impl TorquePid {
         }
         for i in 0..n {
             motor[i] = self.joint(i, tau_des[i], tau[i]);
+            self.told[i] = motor[i];
         }
         Ok(())
     }
@@ -70,7 +81,9 @@ impl TorquePid {
         self.previous[i] = Some(e);
         let memory = (-self.dt / c.derivative_filter).exp();
         self.derivative[i] = memory * self.derivative[i] + (1.0 - memory) * rate;
-        let integral = self.integral[i] + c.K_i * e * self.dt;
+        let told = self.told[i];
+        let answers = told.abs() <= TOLD * limit || tau * told.signum() >= ANSWER * told.abs();
+        let integral = self.integral[i] + if answers { c.K_i * e * self.dt } else { 0.0 };
         let wanted = tau_des + c.K_p * e + integral + c.K_d * self.derivative[i];
         let motor = wanted.clamp(min, max);
         if (wanted - motor) * e <= 0.0 {
@@ -103,6 +116,22 @@ mod tests {
         // The open motor needs 15 ms to come within 5 %.
         assert!(settled < 0.008, "{settled}");
         assert!((tau[0] - 0.2).abs() < 1e-3);
+    }
+
+    #[test]
+    fn power_that_comes_back_finds_the_integral_as_it_was() {
+        let (mut pid, mut motor) = (pid(1), [0.0]);
+        for _ in 0..3000 {
+            pid.step(&[0.1], &[0.0], &mut motor).unwrap();
+        }
+        let mut tau = [0.0];
+        let share = 1.0 - (-1.0_f64 / 5.0).exp();
+        for _ in 0..10 {
+            pid.step(&[0.1], &tau, &mut motor).unwrap();
+            tau[0] += share * (motor[0] - tau[0]);
+            assert!(tau[0] < 0.12, "{}", tau[0]);
+        }
+        assert!((tau[0] - 0.1).abs() < 0.01, "{}", tau[0]);
     }
 
     #[test]
