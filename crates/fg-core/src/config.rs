@@ -23,6 +23,9 @@ pub struct Config {
     pub torque: TorqueConfig,
     /// When a measurement is not believed, and what then happens. Deviation: the paper's sensors work.
     pub safety: SafetyConfig,
+    /// Marks of the [`crate::rules`] whose fields were stated.
+    #[serde(skip)]
+    pub(crate) stated: u32,
 }
 
 impl Default for Config {
@@ -35,6 +38,7 @@ impl Default for Config {
             robust: RobustConfig::default(),
             torque: TorqueConfig::default(),
             safety: SafetyConfig::default(),
+            stated: 0,
         }
     }
 }
@@ -278,10 +282,11 @@ impl Default for TorqueConfig {
 }
 
 impl Config {
-    /// The configuration written in `json`; absent fields keep their defaults.
+    /// The configuration written in `json`; absent fields keep their defaults, which [`crate::rules`] fits to the grasp.
     pub fn from_json(json: &str) -> Result<Self, Error> {
-        let config: Self = serde_json::from_str(json)
-            .map_err(|e| Error::config("config", "the fields and types of Config", e))?;
+        let wrong = |e| Error::config("config", "the fields and types of Config", e);
+        let mut config: Self = serde_json::from_str(json).map_err(wrong)?;
+        config.stated = crate::rules::stated(&serde_json::from_str(json).map_err(wrong)?);
         config.validate()?;
         Ok(config)
     }

@@ -18,6 +18,7 @@ use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, Fo
 use crate::manipulation::posture::Posture;
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
+use crate::rules::{self, Scale};
 use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
 use crate::safety::steady::SteadyWrench;
@@ -28,6 +29,8 @@ use nalgebra::{DMatrix, DVector, Vector6};
 /// The whole controller. All memory is allocated in [`DualStagePlanner::new`].
 pub struct DualStagePlanner {
     hand: HandModel,
+    /// As it was given, and as it fits the grasp: [`rules`].
+    given: Config,
     config: Config,
     dt: f64,
     guard: Guard,
@@ -147,6 +150,7 @@ impl DualStagePlanner {
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
             hand,
+            given: config.clone(),
             config,
         })
     }
@@ -156,7 +160,7 @@ impl DualStagePlanner {
         &self.hand
     }
 
-    /// The configuration in use.
+    /// The configuration in use, fitted to the grasp since the first.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -248,6 +252,17 @@ impl DualStagePlanner {
             self.planner.reset();
             self.velocity_force.reset(self.grasp.contact(k).f_n);
         }
+        if first {
+            let scale = Scale::of(&self.grasp, self.robust.weight());
+            self.fit(rules::fitted(&self.given, &scale));
+        }
+    }
+
+    /// Takes the configuration that fits the grasp.
+    pub(super) fn fit(&mut self, config: Config) {
+        self.guard.fit(&config.safety);
+        self.planner.fit(&config.gait);
+        self.config = config;
     }
 
     /// Adapts the assumed friction to the slip of the fingers that hold the object.

@@ -10,6 +10,7 @@ impl DualStagePlanner {
     /// Returns to the state after construction.
     pub fn reset(&mut self) {
         self.guard.reset();
+        self.fit(self.given.clone());
         self.grasp = Grasp::new(&self.hand, self.config.gait.contact_force);
         self.quality.reset();
         self.supervisor.reset();

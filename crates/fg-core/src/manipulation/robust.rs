@@ -178,6 +178,11 @@ impl RobustController {
         self.filtered = None;
     }
 
+    /// Nominal weight of the object, N.
+    pub fn weight(&self) -> f64 {
+        self.lift.norm()
+    }
+
     /// Pose error of the last step against the filtered reference, m and rad.
     pub fn error(&self) -> &Vector6<f64> {
         &self.e

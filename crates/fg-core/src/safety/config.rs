@@ -52,6 +52,15 @@ pub struct SafetyConfig {
     pub lost_distance: f64,
     /// ... and its sensor when it has not after this time, s.
     pub lost_time: f64,
+    /// A finger that looks for the surface is on its way while it advances by this in 0.4 s, m.
+    pub pressing_distance: f64,
+    /// Joint angles that were refused are right when they explain the finger's contact to within this, m: fingers roll and
+    /// creep a little.
+    pub relearn_distance: f64,
+    /// Length that weighs turns against displacements in the pose's noise, m.
+    pub pose_arm: f64,
+    /// Noise of the pose that no controller minds, m: a sensor with less is used as it is.
+    pub pose_quiet: f64,
     /// A motor is dead when its joint, asked for more torque than this, N m ...
     pub motor_asked: f64,
     /// ... gives less than this, N m ...
@@ -97,6 +106,10 @@ impl Default for SafetyConfig {
             loaded_force: 0.3,
             lost_distance: 2e-3,
             lost_time: 0.05,
+            pressing_distance: 1e-3,
+            relearn_distance: 4e-3,
+            pose_arm: 0.03,
+            pose_quiet: 3e-5,
             motor_asked: 0.08,
             motor_given: 0.03,
             motor_time: 0.01,
@@ -140,6 +153,10 @@ impl SafetyConfig {
             ("loaded_force", self.loaded_force, 0.0, 1e3),
             ("lost_distance", self.lost_distance, positive, 1.0),
             ("lost_time", self.lost_time, 0.0, 60.0),
+            ("pressing_distance", self.pressing_distance, positive, 1.0),
+            ("relearn_distance", self.relearn_distance, positive, 1.0),
+            ("pose_arm", self.pose_arm, positive, 10.0),
+            ("pose_quiet", self.pose_quiet, positive, 1.0),
             ("motor_asked", self.motor_asked, self.motor_given, 1e6),
             ("motor_given", self.motor_given, positive, 1e6),
             ("motor_time", self.motor_time, 0.0, 60.0),

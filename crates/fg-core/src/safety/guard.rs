@@ -121,6 +121,14 @@ impl Guard {
         }
     }
 
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
+        self.joints.fit(config);
+        self.touch.fit(config);
+        self.pose.fit(config);
+    }
+
     /// Forgets the past. Allocates nothing.
     pub fn reset(&mut self) {
         self.clock.reset();

@@ -78,6 +78,11 @@ impl JointGuard {
         }
     }
 
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
+    }
+
     /// Forgets the past.
     pub fn reset(&mut self) {
         for joint in &mut self.joints {
@@ -132,7 +137,7 @@ impl JointGuard {
                 let joints = &self.joints[at.clone()];
                 let turns = |i: usize| joints[i].turn();
                 let refused = &mut self.refused[j];
-                if refused.explains(j, turns, held, elapsed, state, odometry) {
+                if refused.explains(j, turns, held, elapsed, state, odometry, self.config.relearn_distance) {
                     self.joints[at.clone()].iter_mut().for_each(Joint::believe);
                     bad = false;
                 }

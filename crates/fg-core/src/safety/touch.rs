@@ -11,8 +11,6 @@ use nalgebra::{Isometry3, Point3, Vector3};
 const FILTER: f64 = 0.01;
 /// A finger that presses, feels nothing and does not advance for this long has lost its sensor, s.
 const PRESSES: f64 = 0.4;
-/// Advance within that time that shows that it is on its way, m.
-const ON_ITS_WAY: f64 = 1e-3;
 
 /// What the last step knew about one finger.
 #[derive(Debug, Clone, Copy)]
@@ -92,6 +90,11 @@ impl TouchGuard {
             failed: Debounce::default(),
         };
         Self { config: config.clone(), dt, contact_force, tips: vec![tip; n] }
+    }
+
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
     }
 
     /// Forgets the past.
@@ -201,7 +204,7 @@ impl Tip {
         if using.pressing && self.replaced.is_none() && self.good.is_some() {
             let (time, here) = self.pressing.unwrap_or_else(|| (0.0, self.mark(j, at)));
             let here = here.moved(j, at, elapsed);
-            self.pressing = (here.by.abs() < ON_ITS_WAY).then_some((time + elapsed, here));
+            self.pressing = (here.by.abs() < c.pressing_distance).then_some((time + elapsed, here));
             return time > PRESSES;
         }
         self.pressing = None;
