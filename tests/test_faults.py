@@ -50,7 +50,7 @@ def injection(scene: SceneModel, **fault: Any) -> Injection:
 
 def spoiled(faults: Injection, t: float) -> tuple[float, Reading]:
     reading = clean(t)
-    said = faults.read(t, reading.q, reading.tau, reading.pose, reading.place, reading.force)
+    said = faults.read(t, reading.q.reshape(-1), reading.tau.reshape(-1), reading.pose, reading.place, reading.force)
     return said, reading
 
 
@@ -132,7 +132,7 @@ def test_swapped_joints_are_swapped_in_readings_and_commands(scene: SceneModel) 
     right = clean(1.5)
     np.testing.assert_array_equal(found["q"][1], right.q[1, [2, 1, 0]])
     faults = injection(scene, **fault)
-    np.testing.assert_array_equal(faults.command(1.5, right.tau)[1], right.tau[1, [2, 1, 0]])
+    np.testing.assert_array_equal(faults.command(1.5, right.tau.ravel()).reshape(4, 3)[1], right.tau[1, [2, 1, 0]])
     np.testing.assert_array_equal(faults.command(2.5, right.tau), right.tau)
 
 

@@ -91,7 +91,7 @@ def test_recovery_is_measured_from_the_pulses_end_above_the_level_before(kind: s
 def make_log(scenario: Scenario, steps: int) -> Log:
     """A log of a perfect run: every number zero, the poses upright and equal."""
     fingers = ["f0", "f1", "f2", "f3"]
-    log = Log(columns(fingers, 3), fingers, 16)
+    log = Log(columns(fingers, [3] * len(fingers)), fingers, 16)
     log.metadata = {"scenario": json.dumps(scenario.model_dump(mode="json", exclude_unset=True))}
     for k in range(steps):
         row = log.append(k * scenario.period)

@@ -147,12 +147,22 @@ def bench(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml).")],
+    file: Annotated[
+        Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml, .urdf).")
+    ],
+    facts: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Facts of the hand.")] = None,
+    as_json: Json = False,
 ) -> None:
     """Say whether a file is valid, and what is in it."""
-    from fingergait.check import describe_file
+    from fingergait.check import check_file
 
-    typer.echo(describe_file(file))
+    found = check_file(file, facts)
+    text = found.pop("text")
+    if as_json:
+        print_json(found)
+    else:
+        typer.echo("\n".join(text), err=not found["valid"])
+    raise typer.Exit(DONE if found["valid"] else BAD_INPUT)
 
 
 def print_json(value: object) -> None:

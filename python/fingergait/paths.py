@@ -34,3 +34,10 @@ def find(name: str | Path, folder: str, suffix: str, field: str, relative_to: Pa
             return candidate.resolve()
     names = ", ".join(sorted(path.stem for path in packaged.glob(f"*{suffix}"))) or "none"
     raise ConfigError(f"{field}: expected a {suffix} file or one of the packaged names ({names}), found {str(name)!r}")
+
+
+def find_hand(name: str | Path, field: str) -> Path:
+    """Path of the hand's model or facts called `name`: a path as given, or a packaged name."""
+    suffix = ".toml" if field.endswith("facts") else ".xml"
+    packaged = MODELS / "hands" / f"{name}{suffix}"
+    return packaged.resolve() if packaged.is_file() else find(name, "", suffix, field)

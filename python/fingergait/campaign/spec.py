@@ -9,10 +9,10 @@ from pydantic import Field, ValidationError
 
 from fingergait._core import ConfigError
 from fingergait.campaign.distributions import Distribution
+from fingergait.fields import Index, NonNegative, Table
 from fingergait.paths import find
 from fingergait.scenario import Scenario
 from fingergait.scenario.faults import KINDS
-from fingergait.scenario.fields import Index, NonNegative, Table
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -14,27 +14,27 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError, Diagnostics
-from fingergait.sim.sensors import Sensors
+from fingergait.sim.sensors import Sensors, joint_names
 
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _GROW = 4096  # rows added at a time
 
 
-def columns(fingers: list[str], n_joints: int) -> list[str]:
+def columns(fingers: list[str], counts: list[int]) -> list[str]:
     """Names of a log's columns after `t`.
 
     `object_*`, `desired_*`: true and desired pose of the object in W. `q_*`: true joint angles, rad.
     `friction_force_*`: true tangential force at each tip, N. `measured_*`: what the sensors said. The rest: the core's
     `Diagnostics`.
     """
-    joints = [f"{name}_{i + 1}" for name in fingers for i in range(n_joints)]
+    joints = joint_names(fingers, counts)
     return [
         *(f"object_{name}" for name in _POSE),
         *(f"desired_{name}" for name in _POSE),
         *(f"q_{joint}" for joint in joints),
         *(f"friction_force_{name}" for name in fingers),
-        *Sensors.columns(fingers, n_joints),
-        *Diagnostics.columns(len(fingers), n_joints),
+        *Sensors.columns(fingers, counts),
+        *Diagnostics.columns(len(fingers), counts),
     ]
 
 

@@ -110,8 +110,9 @@ def _joints_at_limits(log: Log, scene: SceneModel, before: NDArray[np.bool_]) ->
 
 
 def _torques_at_limits(log: Log, scene: SceneModel, before: NDArray[np.bool_]) -> list[str]:
-    limits = torque_limits(scene).ravel()
-    at = (np.abs(log.block("tau_des")[before]) >= 0.999 * limits).mean(axis=0)
+    low, high = torque_limits(scene)
+    tau = log.block("tau_des")[before]
+    at = ((tau >= 0.999 * high) | (tau <= 0.999 * low)).mean(axis=0)
     names = [scene.model.joint(joint).name for finger in scene.fingers for joint in finger.joints]
     saturated = [f"{name} {100 * share:.0f} %" for name, share in zip(names, at, strict=True) if share > 0.1]
     return [f"torques were at their limit ({', '.join(saturated)} of the time)"] if saturated else []

@@ -29,10 +29,13 @@ class Timing:
     solver: dict[str, int] = field(default_factory=dict)
 
 
-def metrics_of(log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: float) -> dict[str, Any]:
+def metrics_of(
+    log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: Array | float
+) -> dict[str, Any]:
     """The figures of `fingergait run --json`, without paths, versions and simulator settings.
 
-    `lost` says why the object was lost, if it was; `tau_max` is the joints' torque limit, N m.
+    `lost` says why the object was lost, if it was; `tau_max` is the torque limit of each joint, (n_q,) or one,
+    N m.
     """
     t = log.t
     errors = pose_errors(log.pose("object"), log.pose("desired"))  # (T, 6)
@@ -143,7 +146,7 @@ def gait_metrics(log: Log, scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def saturated_fraction(log: Log, scenario: Scenario, tau_max: float) -> float | None:
+def saturated_fraction(log: Log, scenario: Scenario, tau_max: Array | float) -> float | None:
     """Share of the counted control steps in which some joint's torque command is at its limit."""
     counted = log.t >= scenario.metrics_from
     commands = np.abs(log.block("tau_des")[counted])

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from fingergait import _core
-from fingergait.hand import hand_json
+from fingergait.hand import model_json
 from fingergait.paths import find
 from fingergait.run.log import Log, columns, describe
 from fingergait.run.loss import LossMonitor, reason
@@ -58,13 +58,14 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         Shown the plant and the log every 16 ms of simulated time; for progress bars and viewers.
     """
     plant = MujocoPlant(scenario)
-    hand = _core.HandModel(hand_json(find(scenario.hand.file, "", ".xml", "hand.file")))
+    hand = _core.HandModel(model_json(plant.scene.hand))
     planner = _core.DualStagePlanner(hand, load_controller(scenario), plant.config)
     scene = plant.scene
-    n, m = len(scene.fingers), scene.n_joints
+    low, high = torque_limits(scene)
+    n, counts = len(scene.fingers), scene.counts
     names = [finger.name for finger in scene.fingers]
     steps = round((scenario.duration + scenario.grasp.settle) * scenario.controller.rate_hz)
-    log = Log(columns(names, m), names, steps)
+    log = Log(columns(names, counts), names, steps)
     log.metadata = metadata(plant)
     step_ns = np.zeros(steps, dtype=np.int64)
     solver: Counter[str] = Counter()
@@ -75,7 +76,7 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
     measurement = plant.reset()
     trajectory = Trajectory(scenario.reference, plant.sensors.pose)
     begin = time.perf_counter()
-    cuts = np.cumsum([7, 7, n * m, n, len(plant.sensors.row)]).tolist()
+    cuts = np.cumsum([7, 7, len(scene.q), n, len(plant.sensors.row)]).tolist()
     for k in range(steps):
         pose, twist = trajectory.sample(plant.t)
         given = plant.injection.reference(plant.t, pose, twist)
@@ -101,7 +102,7 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         measurement = plant.step(command)
     plant.close()
     timing = Timing(step_ns[: len(log)], time.perf_counter() - begin, dict(solver))
-    metrics = metrics_of(log, scenario, lost, timing, float(torque_limits(scene).min()))
+    metrics = metrics_of(log, scenario, lost, timing, np.minimum(-low, high))
     metrics["simulator"] = settings(scene, scenario)
     metrics["versions"] = versions()
     return Run(metrics, log)

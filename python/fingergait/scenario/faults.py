@@ -7,7 +7,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from fingergait.scenario.fields import Index, NonNegative, Positive, Table, Twist
+from fingergait.fields import Index, NonNegative, Positive, Table, Twist
 
 _EDGE = 1e-9  # s: a time that is this close to a fault's edge is on it
 

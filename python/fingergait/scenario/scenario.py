@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fingergait._core import ConfigError
+from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 from fingergait.object.shapes import SIZES, Shape
 from fingergait.paths import find
 from fingergait.scenario.faults import KINDS, Fault
-from fingergait.scenario.fields import NonNegative, Positive, Table, Twist, Vector
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -24,17 +24,29 @@ else:
 
 
 class HandConfig(Table):
-    """The hand: an MJCF file or a packaged name."""
+    """The hand: an MJCF or URDF file, or a packaged name; its facts file (absent: `<stem>.facts.toml` beside it); pose
+    of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where the file's own does not serve."""
 
     file: str = "hand"
+    facts: str | None = None
+    pose: Twist | None = None
+
+
+class SupportConfig(Table):
+    """A table below the object: height of its top, m (absent: none), and where its middle is, m."""
+
+    height: float | None = None
+    position: tuple[float, float] = (0.0, 0.0)
 
 
 class ObjectConfig(Table):
-    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg)."""
+    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg); nominal pose
+    at the start [x, y, z, rx, ry, rz] in W, m and rotation vector (absent: upright amid the fingers, on the palm)."""
 
     shape: Literal["cylinder", "ellipsoid", "box", "cone"] = "cylinder"
     size: tuple[float, ...] = (0.025, 0.06)
     mass: Positive = 0.5
+    pose: Twist | None = None
 
     @property
     def geometry(self) -> Shape:
@@ -80,8 +92,10 @@ class TruthConfig(Table):
 
 class GraspConfig(Table):
     """How the run starts: contact height above O, m; force (N) with which each tip presses when the controller takes
-    over; time (s) before t = 0 in which the controller holds the start pose."""
+    over; time (s) before t = 0 in which the controller holds the start pose. joints: angles of the independent joints,
+    finger by finger, rad (absent: each tip touches the side at the azimuth of its finger's base)."""
 
+    joints: tuple[float, ...] | None = None
     height: float = 0.0
     press: Positive = 0.5
     settle: NonNegative = 0.3
@@ -172,6 +186,7 @@ class Scenario(Table):
     seed: Annotated[int, Field(ge=0)] = 0
     metrics_from_s: float | None = None
     hand: HandConfig = HandConfig()
+    support: SupportConfig = SupportConfig()
     object: ObjectConfig = ObjectConfig()
     truth: TruthConfig = TruthConfig()
     grasp: GraspConfig = GraspConfig()
@@ -202,8 +217,8 @@ class Scenario(Table):
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path.name}: expected TOML, found: {error}") from None
         values.setdefault("name", path.stem)
-        for table in ("controller", "hand"):
-            _resolve_beside(values, table, path.parent)
+        for table, key in (("controller", "file"), ("hand", "file"), ("hand", "facts")):
+            _resolve_beside(values, table, key, path.parent)
         return cls.build(values, overrides)
 
     @classmethod
@@ -266,11 +281,11 @@ def _item(items: list[Any], part: str, key: str) -> Any:
     return items[int(part)]
 
 
-def _resolve_beside(values: dict[str, Any], table: str, folder: Path) -> None:
+def _resolve_beside(values: dict[str, Any], table: str, key: str, folder: Path) -> None:
     """Makes a file that a scenario names relative to itself absolute; packaged names stay as they are."""
     entry = values.get(table)
-    if isinstance(entry, dict) and isinstance(entry.get("file"), str) and (folder / entry["file"]).is_file():
-        entry["file"] = str((folder / entry["file"]).resolve())
+    if isinstance(entry, dict) and isinstance(entry.get(key), str) and (folder / entry[key]).is_file():
+        entry[key] = str((folder / entry[key]).resolve())
 
 
 def _describe(error: ValidationError) -> str:

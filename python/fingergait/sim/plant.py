@@ -52,11 +52,13 @@ class MujocoPlant:
         self.start = nominal_start(self.scene, scenario)
         self.injection = Injection(self.scene, scenario.fault)
         self.data = mujoco.MjData(self.scene.model)
-        n, m = len(self.scene.fingers), self.scene.n_joints
-        self.config = core_config(scenario, float(torque_limits(self.scene).min()))
-        self._pid = TorquePid(n * m, float(self.scene.model.opt.timestep), self.config)
-        self._tau = np.zeros((n, m))
-        self._tau_row = self._tau.reshape(-1)
+        self.config = core_config(scenario)
+        low, high = torque_limits(self.scene)
+        self._pid = TorquePid(len(self.scene.q), float(self.scene.model.opt.timestep), self.config, low, high)
+        # A motor that answers within two physics steps gives what it is told: feedback would only make it ring.
+        self._open = _lags(self.scene) < 2.0 * self.scene.model.opt.timestep
+        self._low, self._high = low, high
+        self._tau = np.zeros(len(self.scene.q))
         self.t = 0.0
         self.reset()
 
@@ -66,10 +68,11 @@ class MujocoPlant:
         mujoco.mj_resetData(scene.model, data)
         data.qpos[:] = self.start.qpos
         data.ctrl[scene.act] = self.start.torque
-        data.act[scene.model.actuator_actadr[scene.act]] = self.start.torque
+        lagging = scene.model.actuator_actadr[scene.act] >= 0
+        data.act[scene.model.actuator_actadr[scene.act[lagging]]] = self.start.torque[lagging]
         for _ in range(round(_CLOSING_S / scene.model.opt.timestep)):
             mujoco.mj_step(scene.model, data)
-        self._tau_row[:] = data.actuator_force[scene.act]
+        self._tau[:] = data.actuator_force[scene.act]
         self._pid.reset()
         self.injection.reset()
         self._steps = 0
@@ -81,7 +84,7 @@ class MujocoPlant:
     def step(self, command: Command) -> Measurement:
         """Drives the motors with `command` for one control period, or for more where a fault makes ticks drop."""
         for _ in range(self.injection.periods(self.t)):
-            self._drive(command.tau)
+            self._drive(command.tau.ravel())
             self._steps += 1
             self.t = (self._steps - self._lead) * self.scenario.period
         return self.sensors.read(self.t)
@@ -100,9 +103,10 @@ class MujocoPlant:
         desired = faults.command(self.t, tau)
         for _ in range(self.scene.substeps):
             motors = self._pid.step(desired, faults.torque_reading(self.t, self._tau)).ravel()
+            motors = np.where(self._open, np.clip(desired, self._low, self._high), motors)
             data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
-            self._tau_row[:] = data.actuator_force[act]
+            self._tau[:] = data.actuator_force[act]
 
     def close(self) -> None:
         """Switches the motors off."""
@@ -117,7 +121,7 @@ class MujocoPlant:
 
     @property
     def joint_angles(self) -> Array:
-        """True joint angles (n_fingers * n_joints,), rad; for the log only."""
+        """True joint angles (n_q,), rad; for the log only."""
         angles: Array = self.data.qpos[self.scene.q]
         return angles
 
@@ -131,3 +135,9 @@ class MujocoPlant:
         arm = self.data.xpos[body] - self.data.xipos[body]
         wrench[3:] += np.cross(arm, wrench[:3])
         self.data.xfrc_applied[body] = wrench
+
+
+def _lags(scene: SceneModel) -> Array:
+    """Time constant of each motor, (n_q,), s; zero where it has none."""
+    lagging = scene.model.actuator_dyntype[scene.act] != mujoco.mjtDyn.mjDYN_NONE
+    return np.where(lagging, scene.model.actuator_dynprm[scene.act, 0], 0.0)

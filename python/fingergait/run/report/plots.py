@@ -1,5 +1,6 @@
 """Plots of one run: tracking errors, grasp quality with the gaits, normal forces."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,11 +67,18 @@ def quality_figure(log: Log, scenario: Scenario) -> Figure:
     return figure
 
 
+def _per_finger(values: Array, log: Log) -> Array:
+    """Largest of each finger's joints, (T, n_fingers), of the values (T, n_q)."""
+    pattern = [re.compile(rf"measured_q_{re.escape(finger)}_\d+") for finger in log.fingers]
+    counts = [sum(bool(own.fullmatch(name)) for name in log.names) for own in pattern]
+    return np.stack([part.max(axis=1) for part in np.split(values, np.cumsum(counts)[:-1], axis=1)], axis=1)
+
+
 def force_figure(log: Log, scenario: Scenario) -> Figure:
     """Measured normal force of each fingertip, and the largest torque command of its joints."""
     figure = _figure(f"{scenario.name}: normal forces and torques", 2)
     forces, torques = figure.axes
-    commands = np.abs(log.block("tau_des")).reshape(len(log), len(log.fingers), -1).max(axis=2)
+    commands = _per_finger(np.abs(log.block("tau_des")), log)
     measured = log.block("measured_force")
     for index, name in enumerate(log.fingers):
         forces.plot(*thin(log.t, measured[:, index]), lw=0.7, color=_colour(index), label=name)
