@@ -14,7 +14,7 @@ ROOT = Path(fg.__file__).resolve().parent
 # Each wing may import those before it. Wings on one floor don't know each other.
 FLOORS = [
     ["_core"],
-    ["fields", "paths"],
+    ["fields", "paths", "files", "stopping"],
     ["hand", "object"],
     ["scenario"],
     ["sim"],

@@ -143,6 +143,12 @@ class Diagnostics:
     def step_allocations(self) -> int:
         """Heap allocations of this control step inside the compiled core."""
     @staticmethod
+    def fault_names() -> list[str]:
+        """Names of all faults: that of number k is bit k of the column `faults` of a log."""
+    @staticmethod
+    def safe_mode_names() -> list[str]:
+        """Names of all modes, from the mildest on: that of number k is k in the column `safe_mode` of a log."""
+    @staticmethod
     def columns(n_fingers: int, n_joints: int | Sequence[int]) -> list[str]:
         """Names of the numbers that `row` gives, in order. `n_joints` is that of each finger, or one number for all."""
     def row(self) -> Array:

@@ -1,15 +1,19 @@
 """The command `fingergait`. Each command's work is elsewhere; here are its options, its output and its exit status."""
 
+import io
 import json
+import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
 from fingergait._core import FingergaitError
+from fingergait.files import make_folder, why
 from fingergait.scenario import Scenario, parse_override
+from fingergait.stopping import Stopped, stoppable
 
 DONE, MISSED, BAD_INPUT = 0, 1, 2
 
@@ -41,10 +45,12 @@ def run(
     if no_gait:
         overrides["gait.enabled"] = False
     loaded = Scenario.load(scenario, overrides)
-    metrics = run_scenario(loaded, out, view, video, quiet=as_json)
+    metrics, stopped = run_scenario(loaded, out, view, video, quiet=as_json)
     if as_json:
         print_json(metrics)
-    raise typer.Exit(MISSED if metrics["dropped"] else DONE)
+    if stopped is not None:
+        raise stopped
+    raise typer.Exit(DONE if metrics["completed"] else MISSED)
 
 
 @app.command()
@@ -61,11 +67,23 @@ def suite(
     from fingergait.run.suite import run_suite
 
     table = SuiteTable(seeds, Console(stderr=True) if as_json else Console())
-    with table:
-        rows = run_suite(list(range(first, first + seeds)), workers, scenario, set_ or [], table.add)
+    rows: list[dict[str, Any]] = []
+
+    def add(row: dict[str, Any]) -> None:
+        rows.append(row)
+        table.add(row)
+
+    stopped: Stopped | None = None
+    try:
+        with table:
+            rows = run_suite(list(range(first, first + seeds)), workers, scenario, set_ or [], add)
+    except Stopped as stop:
+        stopped = Stopped(f"{len(rows)} of {seeds} seeds are done: the rows above", stop.status - 128)
     summary = table.summary(rows)
     if as_json:
         print_json({**summary, "runs": rows})
+    if stopped is not None:
+        raise stopped
     raise typer.Exit(DONE if summary["held"] == len(rows) else MISSED)
 
 
@@ -127,7 +145,7 @@ def synthesize(
     from fingergait.paths import find
     from fingergait.synthesis.command import run_synthesize
 
-    out.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(out.parent)
     run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json)
 
 
@@ -171,12 +189,27 @@ def print_json(value: object) -> None:
 
 
 def main() -> None:
-    """Entry point: errors made on purpose are one line on standard error and exit status 2."""
+    """Entry point: errors made on purpose and the system's are one line on standard error and exit status 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a terminal without some character shows its number
+            stream.reconfigure(errors="backslashreplace")
     try:
-        app()
+        with stoppable():
+            app()
     except FingergaitError as error:
-        print(f"fingergait: {error}", file=sys.stderr)
+        _complain(f"{error}")
         sys.exit(BAD_INPUT)
+    except Stopped as stop:
+        _complain(f"stopped: {stop}")
+        sys.exit(stop.status)
+    except OSError as error:
+        name = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, str | bytes) else ""
+        _complain(f"{name}{why(error)}")
+        sys.exit(BAD_INPUT)
+
+
+def _complain(message: str) -> None:
+    print(f"fingergait: {' '.join(message.split())}", file=sys.stderr)
 
 
 if __name__ == "__main__":

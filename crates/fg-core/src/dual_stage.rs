@@ -186,6 +186,8 @@ impl DualStagePlanner {
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
             grasped: self.supervisor.threshold().is_some(),
+            own: self.tau_own.as_slice(),
+            J: &self.grasp.J,
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
             Course::Run => {

@@ -53,7 +53,7 @@ macro_rules! rule {
 }
 
 /// Every rule.
-pub const RULES: [Rule; 12] = [
+pub const RULES: [Rule; 13] = [
     rule!(
         "/force/torque_length",
         |c| c.force.torque_length,
@@ -85,6 +85,7 @@ pub const RULES: [Rule; 12] = [
     ),
     rule!("/safety/stale_motion/0", |c| c.safety.stale_motion[0], [1, 0], "as the pose's jump"),
     rule!("/safety/loaded_force", |c| c.safety.loaded_force, [0, 1], "a share of what each finger carries"),
+    rule!("/safety/effort_margin", |c| c.safety.effort_margin, [0, 1], "a share of what each finger carries"),
     rule!("/safety/squeeze_force", |c| c.safety.squeeze_force, [0, 1], "a share of what each finger carries"),
 ];
 

@@ -166,6 +166,18 @@ impl Diagnostics {
         self.core.faults.iter().map(fg_core::safety::Fault::as_str).collect()
     }
 
+    /// Names of all faults: that of number k is bit k of the column `faults` of a log.
+    #[staticmethod]
+    fn fault_names() -> Vec<&'static str> {
+        fg_core::safety::Fault::ALL.iter().map(|fault| fault.as_str()).collect()
+    }
+
+    /// Names of all modes, from the mildest on: that of number k is k in the column `safe_mode` of a log.
+    #[staticmethod]
+    fn safe_mode_names() -> Vec<&'static str> {
+        fg_core::safety::SafeMode::ALL.iter().map(|mode| mode.as_str()).collect()
+    }
+
     /// Grasp quality Q, eq. (1).
     #[getter]
     fn quality(&self) -> f64 {

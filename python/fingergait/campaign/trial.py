@@ -20,6 +20,7 @@ from fingergait.sim.scene import true_inertia
 METRICS: dict[str, type] = {
     "duration_s": float,
     "dropped": bool,
+    "completed": bool,
     "lost_reason": str,
     "rotation_rad": float,
     "max_position_error_m": float,

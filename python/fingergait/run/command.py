@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fingergait._core import ConfigError
+from fingergait.files import make_folder, write_text
 from fingergait.run.log import Log
 from fingergait.run.report.film import film_strip, video_problem
 from fingergait.run.report.film import video as write_video
@@ -20,10 +21,15 @@ from fingergait.run.report.table import show
 from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
 from fingergait.sim.plant import MujocoPlant
+from fingergait.stopping import StopFlag, Stopped, stop_flag
 
 
-def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool) -> dict[str, Any]:
-    """Runs a scenario and writes log.parquet, metrics.json, the plots and film.png; its metrics.
+def run_scenario(
+    scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool
+) -> tuple[dict[str, Any], Stopped | None]:
+    """Runs a scenario and writes log.parquet, metrics.json, the plots and film.png; its metrics, and what stopped it.
+
+    Where the user stops it, what was measured so far is written all the same, but for the film strip and the video.
 
     Parameters
     ----------
@@ -41,43 +47,53 @@ def run_scenario(scenario: Scenario, out: Path | None, view: bool, video: Path |
     folder = out if out is not None else Path("runs") / f"{scenario.name}-{scenario.seed}"
     if video is not None:
         _check_video(video)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out: expected a folder that can be written, found {folder} ({error.strerror})") from None
-    notes = Console(stderr=True, highlight=False)
-    with _Watch(scenario, view) as watch:
-        result = simulate(scenario, watch)
-    metrics = result.metrics
-    log = folder / "log.parquet"
-    metrics["log"] = str(log)
-    result.log.write(log)
-    (folder / "metrics.json").write_text(json.dumps(metrics, indent=2) + "\n", encoding="utf-8")
-    write_plots(result.log, scenario, folder)
-    problems = [film_strip(log, folder / "film.png"), write_video(log, video) if video is not None else None]
+    make_folder(folder)
+    notes = Console(stderr=True, highlight=False, soft_wrap=True)
+    with stop_flag() as flag:
+        with _Watch(scenario, view, flag) as watch:
+            result = simulate(scenario, watch)
+        metrics = result.metrics
+        stopped = _stopped(flag, metrics, scenario, folder)
+        log = folder / "log.parquet"
+        metrics["log"] = str(log)
+        result.log.write(log)
+        write_text(folder / "metrics.json", json.dumps(metrics, indent=2) + "\n")
+        if len(result.log) > 1:
+            write_plots(result.log, scenario, folder)
+    problems = []
+    if stopped is None:
+        problems = [film_strip(log, folder / "film.png"), write_video(log, video) if video is not None else None]
     for problem in problems:
         if problem is not None:
             notes.print(problem, style="yellow")
     if not quiet:
         console = Console()
         show(metrics, console)
-        console.print(f"log, metrics, plots and film strip: {folder}", highlight=False)
-    return metrics
+        console.print(f"log, metrics, plots and film strip: {folder}", highlight=False, markup=False)
+    return metrics, stopped
+
+
+def _stopped(flag: StopFlag, metrics: dict[str, Any], scenario: Scenario, folder: Path) -> Stopped | None:
+    """What to say where the user has stopped the run."""
+    if flag.signum is None:
+        return None
+    reached = f"{max(0.0, metrics['duration_s']):.2f} of {scenario.duration:g} s"
+    return Stopped(f"at {reached}; log, metrics and plots up to there: {folder}", flag.signum)
 
 
 def _check_video(video: Path) -> None:
     problem = video_problem()
     if problem is not None:
         raise ConfigError(problem)
-    if video.suffix != ".mp4" or not video.parent.is_dir():
+    if video.suffix != ".mp4" or not video.parent.is_dir() or video.is_dir():
         raise ConfigError(f"--video: expected a .mp4 file in a folder that exists, found {video}")
 
 
 class _Watch:
     """A progress bar on standard error and, if wanted, the viewer; called by `simulate`."""
 
-    def __init__(self, scenario: Scenario, view: bool) -> None:
-        self._scenario, self._view = scenario, view
+    def __init__(self, scenario: Scenario, view: bool, flag: StopFlag) -> None:
+        self._scenario, self._view, self._flag = scenario, view, flag
         self._viewer: Any = None
         self._stack = contextlib.ExitStack()
         columns = (
@@ -100,7 +116,9 @@ class _Watch:
         self._stack.close()
 
     def __call__(self, plant: MujocoPlant, log: Log) -> bool:
-        """Shows the present state; True when the viewer has been closed."""
+        """Shows the present state; True when the viewer has been closed or the user has stopped the command."""
+        if self._flag:
+            return True
         now = time.perf_counter()
         if now - self._shown > 0.1:
             self._shown = now

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors, yaw_reached
+from fingergait.run.verdict import verdict
 from fingergait.scenario import Disturbance, Scenario
 
 Array = NDArray[np.float64]
@@ -46,6 +47,7 @@ def metrics_of(
         "seed": scenario.seed,
         "duration_s": float(t[-1]) + scenario.period,
         "dropped": lost is not None,
+        **verdict(log, scenario, lost is not None),
         "lost_reason": lost,
         "rotation_rad": float(yaw_reached(log.pose("object"))[-1]),
         "metrics_from_s": scenario.metrics_from,

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fingergait import _core
+from fingergait.files import make_folder, whole_file
 from fingergait.hand import model_json
 from fingergait.paths import find
 from fingergait.run.simulate import load_controller
@@ -53,8 +54,8 @@ def record(scenario: Scenario, out: Path) -> int:
         "rate_hz": scenario.controller.rate_hz,
         "rows": len(rows),
     }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with out.open("wb") as file:
+    make_folder(out.parent, "out")
+    with whole_file(out) as temporary, temporary.open("wb") as file:
         file.write(json.dumps(head, separators=(",", ":")).encode() + b"\n")
         file.write(np.asarray(rows, dtype="<f4").tobytes())
     return len(rows)

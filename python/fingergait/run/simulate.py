@@ -25,6 +25,8 @@ from fingergait.sim.scene import settings, torque_limits
 Watcher = Callable[[MujocoPlant, "Log"], bool | None]
 """Called about every 16 ms of simulated time; True ends the run."""
 
+_REFUSED_S = 0.5  # time at which a start that is still refused ends the run: nothing is driven, nothing will change
+_REFUSED = {"pose_frame", "tactile_axes"}
 _CHECK_EVERY = 5  # control steps between two looks at whether the object is lost
 
 
@@ -76,7 +78,7 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
     measurement = plant.reset()
     trajectory = Trajectory(scenario.reference, plant.sensors.pose)
     begin = time.perf_counter()
-    cuts = np.cumsum([7, 7, len(scene.q), n, len(plant.sensors.row)]).tolist()
+    cuts = np.cumsum([7, 7, len(scene.q), n, 1, len(plant.sensors.row)]).tolist()
     for k in range(steps):
         pose, twist = trajectory.sample(plant.t)
         given = plant.injection.reference(plant.t, pose, twist)
@@ -86,13 +88,17 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
         row[cuts[0] : cuts[1]] = pose
         row[cuts[1] : cuts[2]] = plant.joint_angles
         row[cuts[2] : cuts[3]] = plant.sensors.tangential
-        row[cuts[3] : cuts[4]] = plant.sensors.row
-        row[cuts[4] :] = diagnostics.row()
+        row[cuts[3]] = plant.link_contact
+        row[cuts[4] : cuts[5]] = plant.sensors.row
+        row[cuts[5] :] = diagnostics.row()
         step_ns[k] = diagnostics.step_ns
         solver[diagnostics.solver] += 1
         if k % _CHECK_EVERY == 0:
             standing = diagnostics.safe_mode != "normal"
-            if monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
+            refused = not _REFUSED.isdisjoint(diagnostics.faults)
+            if refused and plant.t >= _REFUSED_S:
+                break
+            if not refused and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
                 lost = reason(log, scene, monitor.symptom)
                 break
         if watch is not None and k % watch_every == 0 and watch(plant, log):

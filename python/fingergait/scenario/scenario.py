@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 from fingergait._core import ConfigError
 from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 from fingergait.object.shapes import SIZES, Shape
-from fingergait.paths import find
+from fingergait.paths import as_text, find
 from fingergait.scenario.faults import KINDS, Fault
 
 if sys.version_info >= (3, 11):
@@ -216,7 +216,7 @@ class Scenario(Table):
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path.name}: expected TOML, found: {error}") from None
-        values.setdefault("name", path.stem)
+        values.setdefault("name", as_text(path.stem))
         for table, key in (("controller", "file"), ("hand", "file"), ("hand", "facts")):
             _resolve_beside(values, table, key, path.parent)
         return cls.build(values, overrides)
@@ -224,9 +224,9 @@ class Scenario(Table):
     @classmethod
     def build(cls, values: dict[str, Any], overrides: dict[str, Any] | None = None) -> "Scenario":
         """The scenario of these TOML values, with dotted keys replaced by `overrides`; errors as `load`."""
-        values = json.loads(json.dumps(values))
+        values = json.loads(as_text(json.dumps(values, ensure_ascii=False)))
         for key, value in (overrides or {}).items():
-            _assign(values, key, value)
+            _assign(values, key, json.loads(as_text(json.dumps(value, ensure_ascii=False))))
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -285,7 +285,7 @@ def _resolve_beside(values: dict[str, Any], table: str, key: str, folder: Path) 
     """Makes a file that a scenario names relative to itself absolute; packaged names stay as they are."""
     entry = values.get(table)
     if isinstance(entry, dict) and isinstance(entry.get(key), str) and (folder / entry[key]).is_file():
-        entry[key] = str((folder / entry[key]).resolve())
+        entry[key] = as_text((folder / entry[key]).resolve())
 
 
 def _describe(error: ValidationError) -> str:

@@ -43,6 +43,7 @@ class Injection:
         """Forgets what the faults froze or counted, and gives the contacts their friction back."""
         self._frozen: dict[int, Any] = {}
         self._steps: dict[int, int] = {}
+        self._dice: dict[int, np.random.Generator] = {}
         self._scene.model.geom(OBJECT).friction[:] = self._friction
 
     def read(self, t: float, q: Array, tau: Array, pose: Array, place: Array, force: Array) -> float:
@@ -82,6 +83,14 @@ class Injection:
                     q[self._at(finger, joint)] = value
                 case kinds.EncoderOffset(finger=finger, joint=joint, shift=shift):
                     q[self._at(finger, joint)] += shift
+                case kinds.EncoderDropout(share=share):
+                    # One number a step, the same in every run.
+                    if self._dice.setdefault(number, np.random.default_rng(number)).random() < share:
+                        q[:] = 0.0
+                case kinds.TactileScale(factor=factor):
+                    force *= factor
+                case kinds.TactileAxes(order=order):
+                    place[:] = place[:, list(order)]
                 case kinds.TactileLost(finger=finger):
                     place[_which(finger)], force[_which(finger)] = 0.0, 0.0
                 case kinds.TactileStuck(finger=finger, value=value):

@@ -59,6 +59,7 @@ class MujocoPlant:
         self._open = _lags(self.scene) < 2.0 * self.scene.model.opt.timestep
         self._low, self._high = low, high
         self._tau = np.zeros(len(self.scene.q))
+        self._object_geoms, self._link_geoms = _parts(self.scene)
         self.t = 0.0
         self.reset()
 
@@ -120,6 +121,15 @@ class MujocoPlant:
         return pose
 
     @property
+    def link_contact(self) -> bool:
+        """Whether a part of a finger other than its tip touches the object; for the log only."""
+        pairs = self.data.contact.geom
+        if not len(pairs):
+            return False
+        on_object, on_link = self._object_geoms[pairs], self._link_geoms[pairs]
+        return bool((on_object & on_link[:, ::-1]).any())
+
+    @property
     def joint_angles(self) -> Array:
         """True joint angles (n_q,), rad; for the log only."""
         angles: Array = self.data.qpos[self.scene.q]
@@ -141,3 +151,13 @@ def _lags(scene: SceneModel) -> Array:
     """Time constant of each motor, (n_q,), s; zero where it has none."""
     lagging = scene.model.actuator_dyntype[scene.act] != mujoco.mjtDyn.mjDYN_NONE
     return np.where(lagging, scene.model.actuator_dynprm[scene.act, 0], 0.0)
+def _parts(scene: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """For each geom, whether it is the object's, and whether it is a part of a finger other than its tip."""
+    model = scene.model
+    joints = {int(model.jnt_bodyid[joint]) for finger in scene.fingers for joint in finger.joints}
+    moves = np.zeros(model.nbody, dtype=bool)
+    for body in range(1, model.nbody):  # parents come first
+        moves[body] = body in joints or moves[model.body_parentid[body]]
+    links = moves[model.geom_bodyid]
+    links[scene.tips] = False
+    return model.geom_bodyid == scene.object_body, links

@@ -3,6 +3,8 @@
 use super::clock::{Clock, Tick};
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
+use super::effort::{EffortGuard, Efforts};
+use super::frame::{FrameGuard, Verdict};
 use super::joints::{self, JointGuard};
 use super::motors::MotorGuard;
 use super::odometry::Odometry;
@@ -13,7 +15,7 @@ use super::{Fault, Faults, SafeMode};
 use crate::error::Error;
 use crate::hand::{HandModel, HandState};
 use crate::signals::{Measurement, Reference};
-use nalgebra::Isometry3;
+use nalgebra::{DMatrix, Isometry3};
 
 /// Time constant with which the fingers press harder and let off again, s.
 const SQUEEZE_TIME: f64 = 0.02;
@@ -44,6 +46,10 @@ pub struct Plan<'a> {
     pub pressing: bool,
     /// There has been a first grasp.
     pub grasped: bool,
+    /// Torques that the fingers needed for their own weight and motion, N m.
+    pub own: &'a [f64],
+    /// Hand Jacobian in the contact frames.
+    pub J: &'a DMatrix<f64>,
 }
 
 /// How the control step went.
@@ -80,9 +86,11 @@ pub struct Guard {
     clock: Clock,
     joints: JointGuard,
     touch: TouchGuard,
+    effort: EffortGuard,
     motors: MotorGuard,
     odometry: Odometry,
     pose: PoseGuard,
+    frame: FrameGuard,
     reference: ReferenceGuard,
     conditions: Conditions,
     faults: Faults,
@@ -104,9 +112,11 @@ impl Guard {
             clock: Clock::new(config, dt),
             joints: JointGuard::new(hand, config, dt),
             touch: TouchGuard::new(hand.n_fingers(), config, contact_force, dt),
+            effort: EffortGuard::new(hand.n_fingers(), config, dt),
             motors: MotorGuard::new((0..hand.n_fingers()).map(|j| hand.joints(j)).collect(), config, dt),
             odometry: Odometry::new(hand, dt),
             pose: PoseGuard::new(config, dt),
+            frame: FrameGuard::new(hand.n_fingers(), config),
             reference: ReferenceGuard::new(config, dt),
             conditions: Conditions::default(),
             faults: Faults::default(),
@@ -126,6 +136,7 @@ impl Guard {
         self.config = config.clone();
         self.joints.fit(config);
         self.touch.fit(config);
+        self.effort.fit(config);
         self.pose.fit(config);
     }
 
@@ -134,9 +145,11 @@ impl Guard {
         self.clock.reset();
         self.joints.reset();
         self.touch.reset();
+        self.effort.reset();
         self.motors.reset();
         self.odometry.reset();
         self.pose.reset();
+        self.frame.reset();
         self.reference.reset();
         self.conditions = Conditions::default();
         self.faults = Faults::default();
@@ -325,6 +338,10 @@ impl Guard {
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
         self.touch.admit(tactile, elapsed, at, using, trusted, &mut self.faults);
+        let efforts = Efforts { tau: measurement.tau.as_slice(), own: plan.own, J: plan.J };
+        let holds = |j: usize| plan.free != Some(j) && motors.drives(j) && self.joints.trusts(j);
+        self.effort.admit(tactile, &efforts, |j| hand.joints(j), holds);
+        self.faults.insert_if(self.effort.failed(), Fault::TactileScale);
     }
 
     fn admit_pose(
@@ -343,6 +360,17 @@ impl Guard {
         let X_WO = self.pose.admit(X_WO, motion.as_ref(), &centre, elapsed, &mut self.faults);
         self.trusted.X_WO = X_WO;
         self.odometry.settle(self.pose.sensed(), self.pose.from_sensor());
+        if !plan.grasped && self.joints.known() {
+            self.frame.admit(hand, state, &self.trusted.tactile, self.pose.sensed());
+            let verdict = self.frame.verdict();
+            self.faults.insert_if(verdict == Verdict::PoseElsewhere, Fault::PoseFrame);
+            self.faults.insert_if(verdict == Verdict::NormalsOutwards, Fault::TactileAxes);
+            if verdict != Verdict::Fits {
+                // The next pose is the first one again: there is nothing that it could have jumped from.
+                self.pose.reset();
+                self.odometry.reset();
+            }
+        }
         self.blind = self.pose.failed() && motion.is_none();
     }
 
@@ -365,6 +393,7 @@ impl Guard {
             || seeking
             || conditions.solver.confirmed()
             || self.touch.failed()
+            || self.effort.failed()
             || self.motors.failed()
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
@@ -384,7 +413,7 @@ impl Guard {
         if self.damped.contains(&true) {
             mode = SafeMode::Damp;
         }
-        if gone || !(self.joints.known() && self.pose.known()) {
+        if gone || self.frame.verdict() != Verdict::Fits || !(self.joints.known() && self.pose.known()) {
             mode = SafeMode::Stop;
         }
         self.allows_gaits = !slow && mode <= SafeMode::Hold;

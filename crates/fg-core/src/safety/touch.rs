@@ -201,7 +201,9 @@ impl Tip {
             self.pressing = None;
             return false;
         }
-        if using.pressing && self.replaced.is_none() && self.good.is_some() {
+        // A finger that has never felt anything, and is told to press, is on its way or has no sensor.
+        let first = self.good.is_none() && using.holding && using.f_n > threshold;
+        if (using.pressing || first) && self.replaced.is_none() && (self.good.is_some() || first) {
             let (time, here) = self.pressing.unwrap_or_else(|| (0.0, self.mark(j, at)));
             let here = here.moved(j, at, elapsed);
             self.pressing = (here.by.abs() < c.pressing_distance).then_some((time + elapsed, here));
@@ -245,7 +247,9 @@ impl Tip {
 impl Advance {
     fn moved(self, j: usize, at: Where<'_>, elapsed: f64) -> Self {
         let p_OF = at.X_WO.inverse_transform_point(&Point3::from(at.state.tip(j).translation.vector));
-        let now = self.n_O.dot(&(p_OF - self.p_OF));
+        let way = p_OF - self.p_OF;
+        // Where the surface faces is not known before the first contact: any way will do.
+        let now = if self.n_O == Vector3::zeros() { way.norm() } else { self.n_O.dot(&way) };
         let by = self.by + (now - self.by) * (1.0 - (-elapsed / FILTER).exp());
         Self { by, time: self.time + elapsed, ..self }
     }

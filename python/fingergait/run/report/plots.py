@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingergait.files import whole_file
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors
 from fingergait.run.report.thin import thin
@@ -29,7 +30,8 @@ def write_plots(log: Log, scenario: Scenario, folder: Path) -> list[Path]:
     paths = []
     for name, draw in figures.items():
         path = folder / f"{name}.png"
-        draw(log, scenario).savefig(path, dpi=110)
+        with whole_file(path) as temporary:
+            draw(log, scenario).savefig(temporary, dpi=110)
         paths.append(path)
     return paths
 
