@@ -151,6 +151,8 @@ def _lags(scene: SceneModel) -> Array:
     """Time constant of each motor, (n_q,), s; zero where it has none."""
     lagging = scene.model.actuator_dyntype[scene.act] != mujoco.mjtDyn.mjDYN_NONE
     return np.where(lagging, scene.model.actuator_dynprm[scene.act, 0], 0.0)
+
+
 def _parts(scene: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """For each geom, whether it is the object's, and whether it is a part of a finger other than its tip."""
     model = scene.model
