@@ -2,6 +2,7 @@
 # make demo    the main job: lift a cylinder and turn it without end
 # make test    every test
 # make check   formats, lints and types; warnings fail
+# make docs    the documentation, with its pictures, as pages in site/
 # make bench   how long a control step takes
 # make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
 # make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
@@ -19,7 +20,7 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench recordings reference daqp fuzz miri clean
+.PHONY: setup demo test wheel check docs bench recordings reference daqp fuzz miri clean
 
 setup: .venv/.module
 
@@ -46,6 +47,11 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The pictures are drawn and rustdoc's pages added by docs/hooks.py; a warning is an error.
+docs: setup
+	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked --quiet --package fg-core
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: setup
 	cargo bench --workspace --locked
@@ -86,12 +92,12 @@ daqp: setup
 	DAQP_SOURCE="$$folder/daqp-0.11.0" cargo run --release --locked --quiet --manifest-path crates/fg-core/daqp/Cargo.toml
 
 clean:
-	rm -rf .venv target
+	rm -rf .venv target site docs/pictures
 
 # The pinned dependencies are there already, or, on Python 3.10, come with the module by the ranges of pyproject.toml.
 .venv/.module: .venv/.dependencies $(SOURCES)
 	@command -v cargo > /dev/null || $(call missing,a stable Rust toolchain,https://rustup.rs or: apt-get install cargo)
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,docs]'
 	@touch $@
 
 .venv/.dependencies: requirements.lock pyproject.toml

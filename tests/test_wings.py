@@ -21,7 +21,7 @@ FLOORS = [
     ["run"],
     ["synthesis"],
     ["campaign", "reproduce", "bench"],
-    ["check"],
+    ["check", "catalogue"],
     ["_former_names"],
     ["cli"],
 ]

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,26 +12,61 @@ import typer
 from rich.console import Console
 
 from fingergait._core import FingergaitError
+from fingergait.catalogue import KINDS, catalogue, names
 from fingergait.files import make_folder, why
 from fingergait.scenario import Scenario, parse_override
 from fingergait.stopping import Stopped, stoppable
 
 DONE, MISSED, BAD_INPUT = 0, 1, 2
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+WELCOME = """\
+Turn an object in a robot hand without end. Try first:
+
+  fingergait run lift-and-rotate --duration 10    lift a cylinder and turn it: table, plots, film strip, log
+  fingergait list                                 what else is packaged
+  fingergait check my-hand.xml                    will my hand do?
+  fingergait --help                               every command
+
+Names complete in the shell after: fingergait --install-completion
+"""
+
+
+def names_of(kind: str) -> Callable[[str], list[str]]:
+    """What the shell offers for a packaged file's name."""
+    return lambda incomplete: [name for name in names(kind) if name.startswith(incomplete)]
+
+
+def example(*lines: str) -> str:
+    """The end of a command's help."""
+    return "Example" + ("s" if len(lines) > 1 else "") + ":\n\n" + "\n\n".join(lines)
+
+
+@app.callback(invoke_without_command=True)
+def start(context: typer.Context) -> None:
+    """Turn an object in a robot hand without end: simulate, synthesise, reproduce, measure."""
+    if context.invoked_subcommand is None:
+        typer.echo(WELCOME)
+
 
 Overrides = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a scenario key.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
-@app.command()
+@app.command(epilog=example("fingergait run push --seed 3 --set truth.mass_scale=1.4"))
 def run(
-    scenario: Annotated[str, typer.Argument(help="A packaged scenario's name, or a TOML file.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A packaged scenario's name, or a TOML file.", autocompletion=names_of("scenarios"))
+    ],
     set_: Overrides = None,
     duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the sensor noise.")] = None,
     no_gait: Annotated[bool, typer.Option("--no-gait", help="Never relocate a finger.")] = False,
-    controller: Annotated[str | None, typer.Option(metavar="FILE", help="Controller artefact, or its name.")] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Controller artefact, or its name.", autocompletion=names_of("controllers")),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the results go.")] = None,
     as_json: Json = False,
     view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer.")] = False,
@@ -53,12 +89,14 @@ def run(
     raise typer.Exit(DONE if metrics["completed"] else MISSED)
 
 
-@app.command()
+@app.command(epilog=example("fingergait suite --seeds 4 --set duration=10"))
 def suite(
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds.")] = 30,
     first: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
-    scenario: Annotated[str, typer.Option(help="The scenario that is varied.")] = "lift-and-rotate",
+    scenario: Annotated[
+        str, typer.Option(help="The scenario that is varied.", autocompletion=names_of("scenarios"))
+    ] = "lift-and-rotate",
     set_: Overrides = None,
     as_json: Json = False,
 ) -> None:
@@ -87,9 +125,16 @@ def suite(
     raise typer.Exit(DONE if summary["held"] == len(rows) else MISSED)
 
 
-@app.command()
+@app.command(epilog=example("fingergait campaign paper-box --samples 100 --out runs/box"))
 def campaign(
-    spec: Annotated[str, typer.Argument(metavar="SPEC.toml", help="A packaged campaign's name, or a TOML file.")],
+    spec: Annotated[
+        str,
+        typer.Argument(
+            metavar="SPEC.toml",
+            help="A packaged campaign's name, or a TOML file.",
+            autocompletion=names_of("campaigns"),
+        ),
+    ],
     samples: Annotated[int | None, typer.Option(min=1, help="Number of runs, instead of the campaign's own.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Local processes; all cores by default.")] = None,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler to use instead.")] = None,
@@ -110,7 +155,7 @@ def campaign(
     raise typer.Exit(DONE if all(claim["held"] for claim in figures["claims"]) else MISSED)
 
 
-@app.command()
+@app.command(epilog=example("fingergait reproduce --quick"))
 def reproduce(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the page and the JSON file go.")] = Path(
         "runs/reproduce"
@@ -131,10 +176,13 @@ def reproduce(
     raise typer.Exit(DONE if summary["held"] == len(summary["claims"]) else MISSED)
 
 
-@app.command("synthesize")
+@app.command("synthesize", epilog=example("fingergait synthesize contact --out runs/mine.json"))
 def synthesize(
     spec: Annotated[
-        str, typer.Argument(metavar="SPEC.toml", help="A packaged spec's name, or a TOML file.")
+        str,
+        typer.Argument(
+            metavar="SPEC.toml", help="A packaged spec's name, or a TOML file.", autocompletion=names_of("specs")
+        ),
     ] = "contact",
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where the artefact goes; the report beside it.")] = Path(
         "runs/controller.json"
@@ -149,7 +197,7 @@ def synthesize(
     run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json)
 
 
-@app.command()
+@app.command(epilog=example("fingergait bench --quick"))
 def bench(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the rows and the plot go.")] = Path("runs/bench"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer steps and problems.")] = False,
@@ -163,7 +211,7 @@ def bench(
         print_json(result)
 
 
-@app.command()
+@app.command(epilog=example("fingergait check my-hand.xml"))
 def check(
     file: Annotated[
         Path, typer.Argument(help="A scenario (.toml), a controller artefact (.json) or a hand (.xml, .urdf).")
@@ -181,6 +229,30 @@ def check(
     else:
         typer.echo("\n".join(text), err=not found["valid"])
     raise typer.Exit(DONE if found["valid"] else BAD_INPUT)
+
+
+@app.command("list", epilog=example("fingergait list scenarios", "fingergait list --json"))
+def list_packaged(
+    kind: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[" + "|".join(KINDS) + "]",
+            help="Only this kind.",
+            autocompletion=lambda incomplete: [kind for kind in KINDS if kind.startswith(incomplete)],
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the packaged scenarios, hands, controllers, specs and campaigns, with a line each."""
+    found = catalogue(kind)
+    if as_json:
+        print_json(found)
+        return
+    for key, entries in found.items():
+        typer.echo(f"{key}:")
+        width = max(map(len, entries), default=0)
+        for name, line in entries.items():
+            typer.echo(f"  {name:{width}}  {line}")
 
 
 def print_json(value: object) -> None:

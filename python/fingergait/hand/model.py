@@ -13,7 +13,15 @@ Array = NDArray[np.float64]
 
 
 def hand_json(path: Path, facts: Path | None = None, pose: tuple[float, ...] | None = None) -> str:
-    """JSON text for `_core.HandModel` of the hand in the model file `path`; arguments and errors as `import_hand`."""
+    """JSON text for `HandModel` of the hand in an MJCF or URDF file; the arguments are those of `import_hand`.
+
+    Raises
+    ------
+    HandError
+        With everything that is in the way, each with what to write where.
+    ConfigError
+        A file that can't be read, or that MuJoCo does not compile.
+    """
     return model_json(import_hand(path, facts, pose))
 
 

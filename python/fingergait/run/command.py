@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fingergait._core import ConfigError
 from fingergait.files import make_folder, write_text
@@ -51,7 +50,7 @@ def run_scenario(
     notes = Console(stderr=True, highlight=False, soft_wrap=True)
     with stop_flag() as flag:
         with _Watch(scenario, view, flag) as watch:
-            result = simulate(scenario, watch)
+            result = simulate(scenario, watch, progress=True)
         metrics = result.metrics
         stopped = _stopped(flag, metrics, scenario, folder)
         log = folder / "log.parquet"
@@ -90,25 +89,14 @@ def _check_video(video: Path) -> None:
 
 
 class _Watch:
-    """A progress bar on standard error and, if wanted, the viewer; called by `simulate`."""
+    """The viewer, if it is wanted; called by `simulate`."""
 
     def __init__(self, scenario: Scenario, view: bool, flag: StopFlag) -> None:
         self._scenario, self._view, self._flag = scenario, view, flag
         self._viewer: Any = None
         self._stack = contextlib.ExitStack()
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.completed:5.1f}/{task.total:.0f} s  {task.fields[state]}"),
-            TimeElapsedColumn(),
-        )
-        console = Console(stderr=True)
-        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-        self._task = self._progress.add_task(scenario.name, total=scenario.duration, state="")
-        self._shown = 0.0
 
     def __enter__(self) -> "_Watch":
-        self._stack.enter_context(self._progress)
         self._begin = time.perf_counter()
         return self
 
@@ -119,11 +107,6 @@ class _Watch:
         """Shows the present state; True when the viewer has been closed or the user has stopped the command."""
         if self._flag:
             return True
-        now = time.perf_counter()
-        if now - self._shown > 0.1:
-            self._shown = now
-            state = f"{int(log.last('gaits'))} gaits, Q {log.last('Q'):.5f}"
-            self._progress.update(self._task, completed=max(0.0, plant.t), state=state)
         if not self._view:
             return False
         if self._viewer is None:

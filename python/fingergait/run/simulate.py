@@ -6,10 +6,12 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
+from rich.table import Table
 
 from fingergait import _core
 from fingergait.hand import model_json
@@ -17,6 +19,8 @@ from fingergait.paths import find
 from fingergait.run.log import Log, columns, describe
 from fingergait.run.loss import LossMonitor, reason
 from fingergait.run.metrics import Timing, metrics_of
+from fingergait.run.progress import RunProgress, in_notebook
+from fingergait.run.report.table import table_of
 from fingergait.scenario import Scenario
 from fingergait.scenario.reference import Trajectory
 from fingergait.sim.plant import MujocoPlant
@@ -30,12 +34,38 @@ _REFUSED = {"pose_frame", "tactile_axes"}
 _CHECK_EVERY = 5  # control steps between two looks at whether the object is lost
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
-    """The outcome of one run: the figures of `fingergait run --json`, and the log they come from."""
+    """The outcome of one run. A notebook shows its table, film strip and plots; `rich.print` its table.
+
+    Attributes
+    ----------
+    metrics
+        The figures of `fingergait run --json`, without the log's path: plain numbers in SI units by their names.
+    log
+        What happened in every control step, see `Log`.
+    """
 
     metrics: dict[str, Any]
     log: Log
+
+    def __repr__(self) -> str:
+        m = self.metrics
+        outcome = f"LOST: {m['lost_reason']}" if m["dropped"] else f"{m['gaits']} gaits, object held"
+        turned = f"turned by {57.29578 * m['rotation_rad']:.0f} degrees in {m['duration_s']:.1f} s"
+        return f"<Run {m['scenario']}, seed {m['seed']}: {turned}, {outcome}>"
+
+    def __rich__(self) -> Table:
+        return table_of(self.metrics)
+
+    def _repr_html_(self) -> str:
+        return self._html
+
+    @cached_property
+    def _html(self) -> str:
+        from fingergait.run.report.page import run_html  # draws with Matplotlib, which few runs need
+
+        return run_html(self.metrics, self.log)
 
 
 def load_controller(scenario: Scenario) -> _core.Controller:
@@ -47,18 +77,33 @@ def load_controller(scenario: Scenario) -> _core.Controller:
         raise _core.ArtifactError(f"{path.name}: {error}") from None
 
 
-def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
-    """Runs a scenario until its duration is over or the object is lost.
+def simulate(scenario: Scenario, watch: Watcher | None = None, *, progress: bool | None = None) -> Run:
+    """The figures and the log of a scenario's run: until its duration is over or the object is lost.
 
-    The same scenario gives the same log, byte for byte, on one machine.
+    The plant is MuJoCo with the scenario's true object, the controller the compiled control step; the order of a step
+    is that of the paper's Section II. The same scenario gives the same log, byte for byte, on one machine.
 
     Parameters
     ----------
     scenario
         What to run.
     watch
-        Shown the plant and the log every 16 ms of simulated time; for progress bars and viewers.
+        Shown the plant and the log every 16 ms of simulated time; for viewers. True ends the run.
+    progress
+        Whether a bar shows how far the run is; absent: in a notebook only.
+
+    Raises
+    ------
+    ConfigError
+        A key that the core refuses, a hand that cannot be used, or fingers that cannot reach the object.
+    ArtifactError
+        A controller artefact that is missing, corrupt, or made for another control rate.
     """
+    with RunProgress(scenario, in_notebook() if progress is None else progress) as bar:
+        return _simulate(scenario, watch, bar)
+
+
+def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress) -> Run:
     plant = MujocoPlant(scenario)
     hand = _core.HandModel(model_json(plant.scene.hand))
     planner = _core.DualStagePlanner(hand, load_controller(scenario), plant.config)
@@ -101,8 +146,10 @@ def simulate(scenario: Scenario, watch: Watcher | None = None) -> Run:
             if not refused and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
                 lost = reason(log, scene, monitor.symptom)
                 break
-        if watch is not None and k % watch_every == 0 and watch(plant, log):
-            break
+        if k % watch_every == 0:
+            bar.update(plant.t, log)
+            if watch is not None and watch(plant, log):
+                break
         if plant.t >= scenario.duration - 1.5 * scenario.period:
             break  # dropped ticks make a step longer than a period
         measurement = plant.step(command)

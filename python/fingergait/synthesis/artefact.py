@@ -46,6 +46,7 @@ class Artefact:
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
+        """The JSON object, in the order of the file."""
         return {
             "format": FORMAT,
             "kind": self.kind,

@@ -16,7 +16,7 @@
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
 //! | [`relearn`] | joint angles that are refused: whether they are right after all |
-//! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
+//! | [`mod@reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
 //! | [`steady`] | nothing: the wrench that goes on without feedback |
 //! | [`limiter`] | the torque command |

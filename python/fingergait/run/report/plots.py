@@ -22,13 +22,8 @@ _FINGER_COLOURS = ("#4C72B0", "#DD8452", "#55A868", "#C44E52", "#8172B3", "#9378
 
 def write_plots(log: Log, scenario: Scenario, folder: Path) -> list[Path]:
     """Writes errors.png, quality.png and forces.png into `folder`; their paths."""
-    figures: dict[str, Callable[[Log, Scenario], Figure]] = {
-        "errors": error_figure,
-        "quality": quality_figure,
-        "forces": force_figure,
-    }
     paths = []
-    for name, draw in figures.items():
+    for name, draw in FIGURES.items():
         path = folder / f"{name}.png"
         with whole_file(path) as temporary:
             draw(log, scenario).savefig(temporary, dpi=110)
@@ -120,3 +115,11 @@ def _shade_pulses(axes: Axes, scenario: Scenario) -> None:
 
 def _colour(finger: int) -> str:
     return _FINGER_COLOURS[finger % len(_FINGER_COLOURS)]
+
+
+FIGURES: dict[str, Callable[[Log, Scenario], Figure]] = {
+    "errors": error_figure,
+    "quality": quality_figure,
+    "forces": force_figure,
+}
+"""The plots of a run, by their names."""

@@ -76,8 +76,8 @@ ROWS: list[Row] = [
 ]
 
 
-def show(metrics: dict[str, Any], console: Console) -> None:
-    """Prints the table, the simulator's settings and, if the object was lost, why."""
+def table_of(metrics: dict[str, Any]) -> Table:
+    """The figures of a run beside the paper's."""
     title = f"{metrics['scenario']}, seed {metrics['seed']}"
     table = Table(title=title, title_justify="left", header_style="bold")
     table.add_column("figure", no_wrap=True)
@@ -87,7 +87,12 @@ def show(metrics: dict[str, Any], console: Console) -> None:
         value = measured(metrics)
         if value != "-":
             table.add_row(name, value, paper)
-    console.print(table)
+    return table
+
+
+def show(metrics: dict[str, Any], console: Console) -> None:
+    """Prints the table, the simulator's settings and, if the object was lost, why."""
+    console.print(table_of(metrics))
     console.print(_settings(metrics["simulator"]), style="dim", highlight=False)
     if metrics["dropped"]:
         console.print(f"LOST: {metrics['lost_reason']}", style="bold red", highlight=False)
