@@ -6,8 +6,10 @@ use crate::hand::TorqueLimits;
 
 /// Share of the torque limit from which on a motor that is told a torque is expected to answer ...
 const TOLD: f64 = 0.05;
-/// ... with at least this share of it.
+/// ... with at least this share of it ...
 const ANSWER: f64 = 0.25;
+/// ... after this time, s: longer than any lag.
+const LATE: f64 = 0.01;
 
 /// Drives measured joint torques to desired ones. One instance serves all joints.
 ///
@@ -24,6 +26,8 @@ pub struct TorquePid {
     previous: Vec<Option<f64>>,
     /// What the motors were told last, N m.
     told: Vec<f64>,
+    /// For how long each has given next to nothing of it, s.
+    silent: Vec<f64>,
 }
 
 impl TorquePid {
@@ -34,8 +38,9 @@ impl TorquePid {
         }
         let n = limits.n();
         let zeros = vec![0.0; n];
-        let (integral, derivative, told, previous) = (zeros.clone(), zeros.clone(), zeros, vec![None; n]);
-        Ok(Self { config: config.clone(), limits, dt, integral, derivative, previous, told })
+        let (integral, derivative, told) = (zeros.clone(), zeros.clone(), zeros.clone());
+        let (previous, silent) = (vec![None; n], zeros);
+        Ok(Self { config: config.clone(), limits, dt, integral, derivative, previous, told, silent })
     }
 
     /// Number of joints.
@@ -49,6 +54,7 @@ impl TorquePid {
         self.derivative.fill(0.0);
         self.previous.fill(None);
         self.told.fill(0.0);
+        self.silent.fill(0.0);
     }
 
     /// Writes the motor torques, N m, for the desired and the measured joint torques.
@@ -83,7 +89,9 @@ impl TorquePid {
         self.derivative[i] = memory * self.derivative[i] + (1.0 - memory) * rate;
         let told = self.told[i];
         let answers = told.abs() <= TOLD * limit || tau * told.signum() >= ANSWER * told.abs();
-        let integral = self.integral[i] + if answers { c.K_i * e * self.dt } else { 0.0 };
+        self.silent[i] = if answers { 0.0 } else { (self.silent[i] + self.dt).min(LATE) };
+        let moves = self.silent[i] < LATE;
+        let integral = self.integral[i] + if moves { c.K_i * e * self.dt } else { 0.0 };
         let wanted = tau_des + c.K_p * e + integral + c.K_d * self.derivative[i];
         let motor = wanted.clamp(min, max);
         if (wanted - motor) * e <= 0.0 {
@@ -129,7 +137,7 @@ mod tests {
         for _ in 0..10 {
             pid.step(&[0.1], &tau, &mut motor).unwrap();
             tau[0] += share * (motor[0] - tau[0]);
-            assert!(tau[0] < 0.12, "{}", tau[0]);
+            assert!(tau[0] < 0.13, "{}", tau[0]);
         }
         assert!((tau[0] - 0.1).abs() < 0.01, "{}", tau[0]);
     }
