@@ -72,6 +72,4 @@ def catalogue(kind: str | None = None) -> dict[str, dict[str, str]]:
     if kind is not None and kind not in KINDS:
         raise ConfigError(f"KIND: expected one of {', '.join(KINDS)}, found {kind!r}")
     chosen = KINDS if kind is None else {kind: KINDS[kind]}
-    return {
-        key: {name: where.describe(path) for name, path in files(key).items()} for key, where in chosen.items()
-    }
+    return {key: {name: where.describe(path) for name, path in files(key).items()} for key, where in chosen.items()}
