@@ -187,6 +187,9 @@ def synthesize(
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where the artefact goes; the report beside it.")] = Path(
         "runs/controller.json"
     ),
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Control rate instead of the spec's; its delay keeps its samples.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Synthesise a robust controller; write its artefact and a one-page report with its certificate."""
@@ -194,7 +197,7 @@ def synthesize(
     from fingergait.synthesis.command import run_synthesize
 
     make_folder(out.parent)
-    run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json)
+    run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json, rate=rate)
 
 
 @app.command(epilog=example("fingergait bench --quick"))

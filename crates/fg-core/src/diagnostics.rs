@@ -49,8 +49,8 @@ pub struct Diagnostics {
     pub status: ForceStatus,
     /// Who solved the QP.
     pub solver: SolverUsed,
-    /// KKT residual of the QP, N; certified up to `force.tolerance`, and taken as it is up to 100 times that where rounding
-    /// or an interior point allow no better.
+    /// KKT residual of the QP, N, of held forces too; certified up to `force.tolerance` times the largest force, and taken as
+    /// it is up to 100 times that where rounding or an interior point allow no better.
     pub kkt: f64,
     /// Iterations of the QP solver.
     pub iterations: usize,

@@ -69,12 +69,21 @@ class Run:
 
 
 def load_controller(scenario: Scenario) -> _core.Controller:
-    """The controller artefact that a scenario names."""
+    """The controller artefact that a scenario names; refused with the remedy if it is sampled at another rate."""
     path = find(scenario.controller.file, "controllers", ".json", "controller.file")
     try:
-        return _core.Controller(path.read_text(encoding="utf-8"))
+        controller = _core.Controller(path.read_text(encoding="utf-8"))
     except (_core.ArtifactError, UnicodeDecodeError) as error:
         raise _core.ArtifactError(f"{path.name}: {error}") from None
+    rate, made = scenario.controller.rate_hz, 1.0 / controller.sample_time
+    if abs(controller.sample_time - scenario.period) > 1e-9:
+        out = f"mu-{rate:g}.json"
+        raise _core.ConfigError(
+            f"controller.rate_hz: expected {made:g} ({path.name} is sampled at {1e3 * controller.sample_time:.4g} ms), "
+            f"found {rate:g}; make one: fingergait synthesize contact --rate {rate:g} --out {out}, "
+            f"then --controller {out}"
+        )
+    return controller
 
 
 def simulate(scenario: Scenario, watch: Watcher | None = None, *, progress: bool | None = None) -> Run:
