@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 import fingergait as fg
+from fingergait.sim.scene import OBJECT
 
 log = fg.simulate(fg.Scenario.load("lift-and-rotate", {"duration": 9.0})).log
 free = log["free_finger"].astype(int)
@@ -17,7 +18,7 @@ after = int(holding[-1])
 
 figure = Figure(figsize=(11.0, 4.2), layout="constrained")
 axes = figure.subplots(1, 4, width_ratios=[1, 1, 1, 1.25])
-radius = 1e3 * float(stage.scene.model.geom("object").size[0])
+radius = 1e3 * float(stage.scene.model.geom(OBJECT).size[0])
 turned = np.rad2deg(np.unwrap(2.0 * np.arctan2(log["object_qz"], log["object_qw"])))
 for ax, row, title in zip(
     axes, (settled, before, after), ("first grasp", "before a gait", "after gaits"), strict=False

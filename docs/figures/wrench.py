@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 import fingergait as fg
+from fingergait.sim.scene import OBJECT
 
 PUSH = {"at": 2.0, "duration": 0.2, "force": [5.0, 0.0, 0.0]}
 scenario = fg.Scenario.load("hold", {"duration": 3.0, "disturbance": [PUSH]})
@@ -20,7 +21,7 @@ friction = log["friction"][row]
 figure = Figure(figsize=(13.0, 6.2), layout="constrained")
 grid = figure.add_gridspec(4, 2, width_ratios=[1.0, 1.25])
 top = figure.add_subplot(grid[:, 0])
-radius = 1e3 * float(stage.scene.model.geom("object").size[0])
+radius = 1e3 * float(stage.scene.model.geom(OBJECT).size[0])
 middle = 1e3 * stage.data.xpos[stage.scene.object_body][:2]
 top.add_patch(Circle(tuple(middle), radius, color="#CC7840", alpha=0.25))
 for j, (place, R, f) in enumerate(contacts):
