@@ -15,6 +15,11 @@ from fingergait.view.play import bench
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _FLAGS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
+_PATIENCE = 240_000  # ms: software draws the scene, on a machine that may be busy
+_SLOWLY = """
+window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), %g);
+window.cancelAnimationFrame = clearTimeout;
+"""
 _SETTLED = 12.0  # s in which the browser has faded the scene in, and drawn the last of it
 
 
@@ -36,10 +41,12 @@ def browser() -> Iterator[Any]:
             chromium.close()
 
 
-def open_page(chromium: Any, address: str, width: int = 1500, height: int = 940) -> Any:
-    """The page at `address`, drawn, in a window of so many pixels."""
+def open_page(chromium: Any, address: str, width: int = 1500, height: int = 940, rate: float | None = None) -> Any:
+    """The page at `address`, drawn, in a window of so many pixels, at most `rate` times a second if that is given."""
     page = chromium.new_page(viewport={"width": width, "height": height})
-    page.set_default_timeout(90_000)  # software draws the scene
+    page.set_default_timeout(_PATIENCE)
+    if rate is not None:
+        page.add_init_script(_SLOWLY % (1e3 / rate))
     page.goto(address)
     page.add_style_tag(content="[class*=Notification] { display: none }")  # that software draws the scene
     page.wait_for_selector("canvas")
