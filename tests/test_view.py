@@ -35,6 +35,7 @@ if server.missing is not None:
     pytest.skip("expected the packages of the live page: pip install 'fingergait[view]'", allow_module_level=True)
 
 from fingergait.view.live import LivePage
+from fingergait.view.play import bench
 from fingergait.view.session import Session
 
 BOUNDS = np.array([-0.01, -0.01, -0.01, -0.2, -0.2, -0.2]), np.array([0.01, 0.01, 0.01, 0.2, 0.2, 0.3])
@@ -347,6 +348,35 @@ def test_a_run_with_a_page_gives_the_log_of_one_without() -> None:
         shown = simulate(scenario, page, every=0.0)
         assert time.perf_counter() - begin > 0.7  # it is held to real time
     assert np.array_equal(plain.log.raw()[1], shown.log.raw()[1], equal_nan=True)
+
+
+@pytest.mark.parametrize(("patience", "paused"), [(100.0, False), (0.0, True)])
+def test_a_run_that_waits_for_its_page_hears_who_stops_it(patience: float, paused: bool) -> None:
+    flag = StopFlag()
+    with LivePage(flag, port=18095, patience=patience) as page:
+        page.pacer.pause(paused)
+        timer = threading.Timer(1.0, lambda: setattr(flag, "signum", 2))
+        timer.start()
+        log = simulate(Scenario.load("hold"), lambda plant, log: bool(flag) or page(plant, log), every=0.0).log
+        timer.join()
+    assert len(log) < 10
+
+
+@pytest.mark.parametrize("hand", [{}, {"hand.file": "five-unequal"}], ids=["four-by-four", "five-unequal"])
+def test_any_hand_is_played_with(hand: dict[str, Any], tmp_path: Path) -> None:
+    scenario = Scenario.load("hold" if hand else "hold-four-by-four", hand)
+    with bench(scenario, server.HOST, 18110, folder=tmp_path) as (session, page):
+        session.inputs.goal([0.01] * 6)
+        until = time.perf_counter() + 60.0
+        while (row := session.history.row()) is None or row.t < 0.6:
+            assert time.perf_counter() < until and session.failure is None
+            time.sleep(0.02)
+        for count in range(6):  # every overlay, plot and word, as if somebody looked
+            for switch in page.overlays.switches.values():
+                switch.value = True
+            page._picture(count)
+        assert len(page.overlays._labels) == len(session.scene.fingers) == len(page.plots.charts[2].data) - 1
+        assert session.lost is None and session.failure is None
 
 
 def test_a_log_is_exported_for_rerun(tmp_path: Path, turning: tuple[Log, Scenario]) -> None:
