@@ -35,7 +35,9 @@ class Bench:
         self._gui = page.server.gui
         self._runs = session.runs
         self._sliders: dict[str, Any] = {}
-        self._add_gizmo(page.server, page.drawing.size)
+        self._size = page.drawing.size
+        self._base = page.server.scene.add_frame("/goal", show_axes=False)
+        self._add_gizmo()
         with self._gui.add_folder("Asked of the controller"):
             self._gui.add_markdown("Drag the gizmo on the object: it is the desired pose.")
             self._add_sliders(_ASKED)
@@ -55,13 +57,13 @@ class Bench:
         button = self._gui.add_button(label, icon=icon)
         button.on_click(lambda _: do())
 
-    def _add_gizmo(self, server: viser.ViserServer, size: float) -> None:
+    def _add_gizmo(self) -> None:
+        """A gizmo where the offset is zero, in place of the one that is there."""
         lower, upper = self._session.inputs.bounds
         limits = [(float(a), float(b)) for a, b in zip(lower, upper, strict=True)]
-        self._base = server.scene.add_frame("/goal", show_axes=False)
-        self._gizmo = server.scene.add_transform_controls(
+        self._gizmo = self._page.server.scene.add_transform_controls(
             "/goal/gizmo",
-            scale=0.6 * size,
+            scale=0.6 * self._size,
             line_width=3.0,
             translation_limits=(limits[0], limits[1], limits[2]),
             rotation_limits=(limits[3], limits[4], limits[5]),
@@ -71,11 +73,10 @@ class Bench:
 
         @self._gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:  # async: in the order of the drag
-            place, turn = np.asarray(event.target.position), np.asarray(event.target.wxyz)
-            if not (np.isfinite(place).all() and np.isfinite(turn).all() and turn.any()):
-                return
-            offset = self._session.inputs.goal([*place, *vtf.SO3(turn / np.linalg.norm(turn)).log()])
-            if event.phase == "end" and offset is not None:
+            offset = self._session.inputs.goal(_offset(event.target.position, event.target.wxyz))
+            if offset is None:
+                self._add_gizmo()  # the page has made nonsense of this one
+            elif event.phase == "end":
                 self._show_goal(np.array(offset))
 
     def _show_goal(self, offset: np.ndarray[Any, np.dtype[np.float64]]) -> None:
@@ -84,7 +85,7 @@ class Bench:
 
     def _centre(self) -> None:
         self._session.inputs.goal(np.zeros(6))
-        self._show_goal(np.zeros(6))
+        self._add_gizmo()
 
     def _add_sliders(self, names: tuple[str, ...]) -> None:
         for name in names:
@@ -149,10 +150,25 @@ class Bench:
             self._base.position = base
         if self._runs != self._session.runs:
             self._runs = self._session.runs
-            self._show_goal(np.zeros(6))
+            self._add_gizmo()
             self._page.overlays.forget()
             for name, slider in self._sliders.items():
                 slider.value = CONTROLS[name].value(self._session.scenario)
+
+
+def _offset(place: Any, turn: Any) -> list[float] | None:
+    """Translation, m, and rotation vector, rad, of a gizmo with this position and wxyz quaternion; None if it is none.
+
+    They come from the page, and may be anything.
+    """
+    try:
+        p, q = np.array(place, dtype=float).reshape(3), np.array(turn, dtype=float).reshape(4)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    if not (np.isfinite(p).all() and np.isfinite(q).all() and q.any()):
+        return None
+    q /= np.abs(q).max()  # so that its length is finite too
+    return [*p.tolist(), *vtf.SO3(q / np.linalg.norm(q)).log().tolist()]
 
 
 def _ignore(_: object) -> None:

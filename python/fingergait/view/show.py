@@ -105,7 +105,7 @@ class Player(threading.Thread):
         self.join()
 
     def seek(self, t: float) -> None:
-        """Shows the row nearest to time t, s."""
+        """Shows the row nearest to time t, s; the last one where that is no number."""
         self._history.at = min(int(np.searchsorted(self._t, t)), len(self._t) - 1)
         self.pacer.restart()
 
