@@ -6,6 +6,7 @@
 # make bench   how long a control step takes
 # make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
 # make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
+# make picture  the picture of the live page in docs/: after each change of what it looks like; needs Chromium
 # make fuzz    the core's steps and parsers on anything at all, under AddressSanitizer; needs a nightly toolchain
 # make miri    the core's unit tests in an interpreter that knows undefined behaviour; needs a nightly toolchain
 # make daqp    the force QP beside DAQP's C code, in one program; needs a C compiler
@@ -20,12 +21,13 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check docs bench recordings reference daqp fuzz miri clean
+.PHONY: setup demo test wheel check docs bench recordings reference picture daqp fuzz miri clean
 
 setup: .venv/.module
 
 demo: setup
 	$(BIN)/fingergait run lift-and-rotate
+	@echo "see it live, and play with it: .venv/bin/fingergait play"
 
 test: setup wheel
 	cargo test --workspace --locked --quiet
@@ -68,9 +70,12 @@ recordings: setup
 	$(RECORD) $(RECORDINGS)/noisy.rec --set duration=6 $(SENSORS:%=--set sensors.%)
 
 reference: setup
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view,docs,peers]'
 	$(BIN)/fingergait bench --out runs/reference
 	cp runs/reference/bench.json models/bench/reference.json
+
+picture: setup
+	$(BIN)/python -m fingergait.view.screenshot docs/live.png
 
 # AddressSanitizer is in all three; what they find new stays in target/.
 FUZZ_SECONDS ?= 60
@@ -97,7 +102,7 @@ clean:
 # The pinned dependencies are there already, or, on Python 3.10, come with the module by the ranges of pyproject.toml.
 .venv/.module: .venv/.dependencies $(SOURCES)
 	@command -v cargo > /dev/null || $(call missing,a stable Rust toolchain,https://rustup.rs or: apt-get install cargo)
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,docs]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view,docs]'
 	@touch $@
 
 .venv/.dependencies: requirements.lock pyproject.toml

@@ -75,7 +75,7 @@ BAD_CALLS = {
     "missing artefact": (["run", "hold", "--controller", "none"], "controller.file: expected"),
     "no option": (["run", "hold", "--no-such"], "No such option"),
     "no mp4": (["run", "hold", "--video", "film.gif"], "--video: expected"),
-    "no display": (["run", "hold", "--view"], "--view: expected a display"),
+    "no display": (["run", "hold", "--view=native"], "--view=native: expected a display"),
     "no file": (["check", "nothing.xml"], "FILE: expected a file, found nothing"),
     "no kind": (["check", "nothing.txt"], "FILE: expected a scenario"),
 }

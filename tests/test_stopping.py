@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
@@ -71,6 +72,26 @@ def test_a_run_keeps_what_was_measured(signum: int, status: int, tmp_path: Path)
     assert figures["duration_s"] == pytest.approx(log.t[-1] + 0.002) and log.t[-1] < 3000.0
     assert json.loads((tmp_path / "metrics.json").read_text()) == figures
     assert (tmp_path / "errors.png").is_file() and not list(tmp_path.glob(".*"))
+
+
+def listening(port: int) -> Callable[[], bool]:
+    """Whether a page is there."""
+
+    def served() -> bool:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=5.0) as answer:
+                return bool(answer.status == 200)
+        except OSError:
+            return False
+
+    return served
+
+
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_a_bench_ends_when_it_is_told_to(signum: int) -> None:
+    pytest.importorskip("viser")
+    status, out, err = stopped(["play", "hold", "--port", "18510"], listening(18510), signum)
+    assert (status, out, err) == (0, "", "live page: http://127.0.0.1:18510\n")
 
 
 CAMPAIGN = """

@@ -19,7 +19,7 @@ FLOORS = [
     ["scenario"],
     ["sim"],
     ["run"],
-    ["synthesis"],
+    ["synthesis", "view"],
     ["campaign", "reproduce", "bench"],
     ["check", "catalogue"],
     ["_former_names"],

@@ -6,16 +6,19 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from fingergait._core import FingergaitError
+from fingergait._core import ConfigError, FingergaitError
 from fingergait.catalogue import KINDS, catalogue, names
 from fingergait.files import make_folder, why
 from fingergait.scenario import Scenario, parse_override
 from fingergait.stopping import Stopped, stoppable
+
+if TYPE_CHECKING:
+    from fingergait.run.command import Viewer
 
 DONE, MISSED, BAD_INPUT = 0, 1, 2
 
@@ -25,6 +28,7 @@ WELCOME = """\
 Turn an object in a robot hand without end. Try first:
 
   fingergait run lift-and-rotate --duration 10    lift a cylinder and turn it: table, plots, film strip, log
+  fingergait play                                 the same live in the browser, to drag, push and break
   fingergait list                                 what else is packaged
   fingergait check my-hand.xml                    will my hand do?
   fingergait --help                               every command
@@ -53,6 +57,9 @@ def start(context: typer.Context) -> None:
 Overrides = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Replace a scenario key.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
+Port = Annotated[int, typer.Option(min=1, max=65535, help="Where the page listens; else the next free port.")]
+Host = Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on; others than this machine see it.")]
+
 
 @app.command(epilog=example("fingergait run push --seed 3 --set truth.mass_scale=1.4"))
 def run(
@@ -69,7 +76,9 @@ def run(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the results go.")] = None,
     as_json: Json = False,
-    view: Annotated[bool, typer.Option("--view", help="Show the run in MuJoCo's viewer.")] = False,
+    view: Annotated[
+        str | None, typer.Option("--view", metavar="[=native]", help="Show it live, in the browser or MuJoCo's window.")
+    ] = None,
     video: Annotated[Path | None, typer.Option(metavar="FILE.mp4", help="Write a video.")] = None,
 ) -> None:
     """Run a scenario; write its log, plots and film strip."""
@@ -81,12 +90,45 @@ def run(
     if no_gait:
         overrides["gait.enabled"] = False
     loaded = Scenario.load(scenario, overrides)
-    metrics, stopped = run_scenario(loaded, out, view, video, quiet=as_json)
+    metrics, stopped = run_scenario(loaded, out, _viewer(view), video, quiet=as_json)
     if as_json:
         print_json(metrics)
     if stopped is not None:
         raise stopped
     raise typer.Exit(DONE if metrics["completed"] else MISSED)
+
+
+@app.command(epilog=example("fingergait play", "fingergait play hold-four-by-four --port 9000"))
+def play(
+    scenario: Annotated[
+        str, typer.Argument(help="A packaged scenario's name, or a TOML file.", autocompletion=names_of("scenarios"))
+    ] = "lift-and-rotate",
+    set_: Overrides = None,
+    port: Port = 8080,
+    host: Host = "127.0.0.1",
+) -> None:
+    """Play with a scenario in the browser: drag the object, push it, cut a finger's power, and see why."""
+    from fingergait.view.play import play as serve
+
+    serve(Scenario.load(scenario, dict(map(parse_override, set_ or []))), host, port)
+
+
+@app.command(epilog=example("fingergait show runs/lift-and-rotate-0/log.parquet"))
+def show(
+    log: Annotated[Path, typer.Argument(metavar="LOG.parquet", help="The log of a run.")],
+    port: Port = 8080,
+    host: Host = "127.0.0.1",
+    rerun: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write it for rerun, show nothing.")] = None,
+) -> None:
+    """Show a recorded run in the browser, with a time bar."""
+    if rerun is not None:
+        from fingergait.view.rerun import export
+
+        typer.echo(f"{rerun}: {export(log, rerun)} pictures")
+    else:
+        from fingergait.view.show import show as serve
+
+        serve(log, host, port)
 
 
 @app.command(epilog=example("fingergait suite --seeds 4 --set duration=10"))
@@ -258,9 +300,30 @@ def list_packaged(
             typer.echo(f"  {name:{width}}  {line}")
 
 
+def _viewer(kind: str | None) -> "Viewer | None":
+    from fingergait.run.command import NativeViewer
+
+    if kind is None:
+        return None
+    if kind == "native":
+        return NativeViewer
+    if kind == "page":
+        from fingergait.view import server
+        from fingergait.view.live import LivePage
+
+        server.require()
+        return LivePage
+    raise ConfigError(f"--view: expected nothing, or --view=native, found {kind!r}")
+
+
 def print_json(value: object) -> None:
     """Writes one JSON object to standard output."""
     print(json.dumps(value, indent=2, allow_nan=False))
+
+
+def spelled_out(arguments: list[str]) -> list[str]:
+    """The arguments with the value of `--view`, which may be left out: Typer has no such options."""
+    return ["--view=page" if argument == "--view" else argument for argument in arguments]
 
 
 def main() -> None:
@@ -270,7 +333,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     try:
         with stoppable():
-            app()
+            app(spelled_out(sys.argv[1:]))
     except FingergaitError as error:
         _complain(f"{error}")
         sys.exit(BAD_INPUT)

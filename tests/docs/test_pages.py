@@ -3,13 +3,14 @@
 import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
 import typer.main
 from pages import PAGES, ROOT, blocks
 
-from fingergait.cli import app, main
+from fingergait.cli import app, main, spelled_out
 from fingergait.paths import MODELS
 
 # What makes a command short enough for a test. Later options win over those on the page.
@@ -19,7 +20,8 @@ QUICK = {
     "campaign": ["--samples", "1", "--workers", "1"],
     "bench": ["--quick"],
 }
-LONG = ("synthesize", "reproduce")  # minutes, however quick: their options are read, and tests of their own run them
+# Minutes, however quick, or without an end: their options are read, and tests of their own run them.
+LONG = ("synthesize", "reproduce", "play", "show")
 # On these pages the object is lost, or the log is read afterwards: they need the time that they take.
 AS_WRITTEN = ("truth.friction=0.05", "--out runs/mine")
 
@@ -37,10 +39,11 @@ def quick(command: str) -> list[str]:
 
 def execute(command: str, status: int, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = quick(command)
-    if arguments[0] in LONG:
-        group = typer.main.get_command(app)
+    if arguments[0] in LONG or "--view" in arguments:
+        group: Any = typer.main.get_command(app)
+        name, *rest = spelled_out(arguments)
         with click.Context(group, info_name="fingergait") as parent:
-            assert group.commands[arguments[0]].make_context(arguments[0], arguments[1:], parent=parent).args == []  # type: ignore[attr-defined]
+            assert group.commands[name].make_context(name, rest, parent=parent).args == []
         return
     monkeypatch.setattr(sys, "argv", ["fingergait", *arguments])
     with pytest.raises(SystemExit) as stop:

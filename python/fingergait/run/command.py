@@ -5,6 +5,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +23,16 @@ from fingergait.scenario import Scenario
 from fingergait.sim.plant import MujocoPlant
 from fingergait.stopping import StopFlag, Stopped, stop_flag
 
+Shown = Callable[[MujocoPlant, Log], bool]
+"""Shows a run in real time: called at every control step, True ends the run."""
+
+Viewer = Callable[[StopFlag], contextlib.AbstractContextManager[Shown]]
+"""Opens what shows a run: `NativeViewer`, or the page `fingergait.view.live.LivePage`. It need not look at the flag,
+but where it lets the run stand."""
+
 
 def run_scenario(
-    scenario: Scenario, out: Path | None, view: bool, video: Path | None, quiet: bool
+    scenario: Scenario, out: Path | None, view: Viewer | None, video: Path | None, quiet: bool
 ) -> tuple[dict[str, Any], Stopped | None]:
     """Runs a scenario and writes log.parquet, metrics.json, the plots and film.png; its metrics, and what stopped it.
 
@@ -37,7 +45,7 @@ def run_scenario(
     out
         Folder of the results; absent: runs/<scenario>-<seed>.
     view
-        Show the run in MuJoCo's viewer, in real time.
+        Shows the run in real time.
     video
         File of a video to write.
     quiet
@@ -49,8 +57,13 @@ def run_scenario(
     make_folder(folder)
     notes = Console(stderr=True, highlight=False, soft_wrap=True)
     with stop_flag() as flag:
-        with _Watch(scenario, view, flag) as watch:
-            result = simulate(scenario, watch, progress=True)
+        with contextlib.ExitStack() as stack:
+            shown = stack.enter_context(view(flag)) if view is not None else None
+
+            def watch(plant: MujocoPlant, log: Log) -> bool:
+                return bool(flag) or (shown is not None and shown(plant, log))
+
+            result = simulate(scenario, watch, progress=True, every=0.016 if view is None else 0.0)
         metrics = result.metrics
         stopped = _stopped(flag, metrics, scenario, folder)
         log = folder / "log.parquet"
@@ -88,43 +101,39 @@ def _check_video(video: Path) -> None:
         raise ConfigError(f"--video: expected a .mp4 file in a folder that exists, found {video}")
 
 
-class _Watch:
-    """The viewer, if it is wanted; called by `simulate`."""
+class NativeViewer(contextlib.ExitStack):
+    """MuJoCo's own window, held to real time; closing it ends the run."""
 
-    def __init__(self, scenario: Scenario, view: bool, flag: StopFlag) -> None:
-        self._scenario, self._view, self._flag = scenario, view, flag
+    def __init__(self, flag: StopFlag) -> None:
+        super().__init__()
         self._viewer: Any = None
-        self._stack = contextlib.ExitStack()
 
-    def __enter__(self) -> "_Watch":
-        self._begin = time.perf_counter()
+    def __enter__(self) -> "NativeViewer":
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._stack.close()
-
     def __call__(self, plant: MujocoPlant, log: Log) -> bool:
-        """Shows the present state; True when the viewer has been closed or the user has stopped the command."""
-        if self._flag:
-            return True
-        if not self._view:
-            return False
+        """Shows the present state about 60 times a second; True when the window has been closed."""
         if self._viewer is None:
-            self._viewer = self._stack.enter_context(_open_viewer(plant))
-        if not self._viewer.is_running():
-            return True
-        self._viewer.sync()
-        ahead = plant.t + self._scenario.grasp.settle - (time.perf_counter() - self._begin)
-        time.sleep(max(0.0, ahead))
+            self._viewer = self.enter_context(_open_viewer(plant))
+            self._begin, self._shown = time.perf_counter() - plant.t, 0.0
+        now = time.perf_counter()
+        if now - self._shown > 0.016:
+            self._shown = now
+            if not self._viewer.is_running():
+                return True
+            self._viewer.sync()
+        time.sleep(max(0.0, plant.t - (now - self._begin) - 0.008))
         return False
 
 
 def _open_viewer(plant: MujocoPlant) -> Any:
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ConfigError("--view: expected a display, found neither DISPLAY nor WAYLAND_DISPLAY set")
+        raise ConfigError("--view=native: expected a display, found neither DISPLAY nor WAYLAND_DISPLAY set")
     try:
         import mujoco.viewer
 
         return mujoco.viewer.launch_passive(plant.scene.model, plant.data, show_left_ui=False, show_right_ui=False)
     except (ImportError, RuntimeError) as error:
-        raise ConfigError(f"--view: expected a display that MuJoCo's viewer can open, found none ({error})") from None
+        raise ConfigError(
+            f"--view=native: expected a display that MuJoCo's viewer can open, found none ({error})"
+        ) from None

@@ -81,6 +81,10 @@ class Log:
         """Times, s."""
         return self._t[: self._length]
 
+    def raw(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Times and rows as they lie in memory, with room for more behind; for readers of a log that grows."""
+        return self._t, self._rows
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """The column called `name`."""
         return self._rows[: self._length, self._index[name]].astype(np.float64)

@@ -14,23 +14,21 @@ import numpy as np
 from rich.table import Table
 
 from fingergait import _core
-from fingergait.hand import model_json
-from fingergait.paths import find
-from fingergait.run.log import Log, columns, describe
+from fingergait.run.log import Log, describe
 from fingergait.run.loss import LossMonitor, reason
 from fingergait.run.metrics import Timing, metrics_of
 from fingergait.run.progress import RunProgress, in_notebook
 from fingergait.run.report.table import table_of
+from fingergait.run.stepper import Stepper
+from fingergait.run.stepper import load_controller as load_controller
 from fingergait.scenario import Scenario
-from fingergait.scenario.reference import Trajectory
 from fingergait.sim.plant import MujocoPlant
 from fingergait.sim.scene import settings, torque_limits
 
 Watcher = Callable[[MujocoPlant, "Log"], bool | None]
-"""Called about every 16 ms of simulated time; True ends the run."""
+"""Called while a run goes on, see `simulate`; True ends the run."""
 
 _REFUSED_S = 0.5  # time at which a start that is still refused ends the run: nothing is driven, nothing will change
-_REFUSED = {"pose_frame", "tactile_axes"}
 _CHECK_EVERY = 5  # control steps between two looks at whether the object is lost
 
 
@@ -68,25 +66,9 @@ class Run:
         return run_html(self.metrics, self.log)
 
 
-def load_controller(scenario: Scenario) -> _core.Controller:
-    """The controller artefact that a scenario names; refused with the remedy if it is sampled at another rate."""
-    path = find(scenario.controller.file, "controllers", ".json", "controller.file")
-    try:
-        controller = _core.Controller(path.read_text(encoding="utf-8"))
-    except (_core.ArtifactError, UnicodeDecodeError) as error:
-        raise _core.ArtifactError(f"{path.name}: {error}") from None
-    rate, made = scenario.controller.rate_hz, 1.0 / controller.sample_time
-    if abs(controller.sample_time - scenario.period) > 1e-9:
-        out = f"mu-{rate:g}.json"
-        raise _core.ConfigError(
-            f"controller.rate_hz: expected {made:g} ({path.name} is sampled at {1e3 * controller.sample_time:.4g} ms), "
-            f"found {rate:g}; make one: fingergait synthesize contact --rate {rate:g} --out {out}, "
-            f"then --controller {out}"
-        )
-    return controller
-
-
-def simulate(scenario: Scenario, watch: Watcher | None = None, *, progress: bool | None = None) -> Run:
+def simulate(
+    scenario: Scenario, watch: Watcher | None = None, *, progress: bool | None = None, every: float = 0.016
+) -> Run:
     """The figures and the log of a scenario's run: until its duration is over or the object is lost.
 
     The plant is MuJoCo with the scenario's true object, the controller the compiled control step; the order of a step
@@ -97,9 +79,11 @@ def simulate(scenario: Scenario, watch: Watcher | None = None, *, progress: bool
     scenario
         What to run.
     watch
-        Shown the plant and the log every 16 ms of simulated time; for viewers. True ends the run.
+        Shown the plant and the log while the run goes on; for viewers. True ends the run.
     progress
         Whether a bar shows how far the run is; absent: in a notebook only.
+    every
+        Simulated time between two looks of `watch`, s; zero: every control step.
 
     Raises
     ------
@@ -109,51 +93,34 @@ def simulate(scenario: Scenario, watch: Watcher | None = None, *, progress: bool
         A controller artefact that is missing, corrupt, or made for another control rate.
     """
     with RunProgress(scenario, in_notebook() if progress is None else progress) as bar:
-        return _simulate(scenario, watch, bar)
+        return _simulate(scenario, watch, bar, every)
 
 
-def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress) -> Run:
-    plant = MujocoPlant(scenario)
-    hand = _core.HandModel(model_json(plant.scene.hand))
-    planner = _core.DualStagePlanner(hand, load_controller(scenario), plant.config)
-    scene = plant.scene
-    low, high = torque_limits(scene)
-    n, counts = len(scene.fingers), scene.counts
-    names = [finger.name for finger in scene.fingers]
+def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress, every: float) -> Run:
+    stepper = Stepper(scenario)
+    plant = stepper.plant
     steps = round((scenario.duration + scenario.grasp.settle) * scenario.controller.rate_hz)
-    log = Log(columns(names, counts), names, steps)
+    log = Log(stepper.columns, stepper.fingers, steps)
     log.metadata = metadata(plant)
     step_ns = np.zeros(steps, dtype=np.int64)
     solver: Counter[str] = Counter()
     monitor = LossMonitor(scenario)
-    watch_every = max(1, round(0.016 * scenario.controller.rate_hz))
+    watch_every = max(1, round(every * scenario.controller.rate_hz))
     lost: str | None = None
 
-    measurement = plant.reset()
-    trajectory = Trajectory(scenario.reference, plant.sensors.pose)
     begin = time.perf_counter()
-    cuts = np.cumsum([7, 7, len(scene.q), n, 1, len(plant.sensors.row)]).tolist()
     for k in range(steps):
-        pose, twist = trajectory.sample(plant.t)
-        given = plant.injection.reference(plant.t, pose, twist)
-        command, diagnostics = planner.step(measurement, _core.Reference(*given))
-        row = log.append(plant.t)
-        row[: cuts[0]] = plant.object_pose
-        row[cuts[0] : cuts[1]] = pose
-        row[cuts[1] : cuts[2]] = plant.joint_angles
-        row[cuts[2] : cuts[3]] = plant.sensors.tangential
-        row[cuts[3]] = plant.link_contact
-        row[cuts[4] : cuts[5]] = plant.sensors.row
-        row[cuts[5] :] = diagnostics.row()
+        diagnostics = stepper.plan()
+        stepper.record(log.append(plant.t))
         step_ns[k] = diagnostics.step_ns
         solver[diagnostics.solver] += 1
         if k % _CHECK_EVERY == 0:
             standing = diagnostics.safe_mode != "normal"
-            refused = not _REFUSED.isdisjoint(diagnostics.faults)
-            if refused and plant.t >= _REFUSED_S:
-                break
-            if not refused and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
-                lost = reason(log, scene, monitor.symptom)
+            if stepper.refused:
+                if plant.t >= _REFUSED_S:
+                    break
+            elif monitor.update(plant.t, plant.object_pose, stepper.pose, plant.sensors.normal_force, standing):
+                lost = reason(log, plant.scene, monitor.symptom)
                 break
         if k % watch_every == 0:
             bar.update(plant.t, log)
@@ -161,11 +128,12 @@ def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress) -> Ru
                 break
         if plant.t >= scenario.duration - 1.5 * scenario.period:
             break  # dropped ticks make a step longer than a period
-        measurement = plant.step(command)
+        stepper.advance()
     plant.close()
     timing = Timing(step_ns[: len(log)], time.perf_counter() - begin, dict(solver))
+    low, high = torque_limits(plant.scene)
     metrics = metrics_of(log, scenario, lost, timing, np.minimum(-low, high))
-    metrics["simulator"] = settings(scene, scenario)
+    metrics["simulator"] = settings(plant.scene, scenario)
     metrics["versions"] = versions()
     return Run(metrics, log)
 

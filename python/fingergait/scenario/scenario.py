@@ -16,6 +16,7 @@ from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 from fingergait.object.shapes import SIZES, Shape
 from fingergait.paths import as_text, find
 from fingergait.scenario.faults import KINDS, Fault
+from fingergait.scenario.inputs import Input
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -196,6 +197,7 @@ class Scenario(Table):
     physics: PhysicsConfig = PhysicsConfig()
     disturbance: tuple[Disturbance, ...] = ()
     fault: tuple[Fault, ...] = ()
+    input: tuple[Input, ...] = ()
     gait: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
@@ -306,8 +308,9 @@ def _describe(error: ValidationError) -> str:
 
 def _keys(loc: tuple[int | str, ...]) -> str:
     """The keys that the table around `loc` has."""
-    if loc[0] in ("disturbance", "fault"):
-        return "one of " + ", ".join((KINDS[str(loc[2])] if loc[0] == "fault" else Disturbance).model_fields)
+    if loc[0] in ("disturbance", "fault", "input"):
+        tables: dict[str, type[Table]] = {"disturbance": Disturbance, "input": Input}
+        return "one of " + ", ".join((tables.get(str(loc[0])) or KINDS[str(loc[2])]).model_fields)
     table: type[BaseModel] = Scenario
     for part in loc[:-1]:
         kind = table.model_fields[str(part)].annotation
@@ -315,4 +318,4 @@ def _keys(loc: tuple[int | str, ...]) -> str:
     return "one of " + ", ".join(table.model_fields)
 
 
-__all__ = ["SIZES", "Disturbance", "ReferenceConfig", "Scenario", "SensorConfig", "parse_override"]
+__all__ = ["SIZES", "Disturbance", "Input", "ReferenceConfig", "Scenario", "SensorConfig", "parse_override"]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
 from fingergait.scenario import faults as kinds
-from fingergait.sim.scene import OBJECT, SceneModel, torque_limits
+from fingergait.sim.scene import OBJECT, SceneModel, contact_friction, torque_limits
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,16 @@ class Injection:
         self._friction = scene.model.geom(OBJECT).friction.copy()
         self._low, self._high = torque_limits(scene)
         self.reset()
+
+    def add(self, fault: kinds.FaultWindow) -> None:
+        """Takes one more fault while the run is under way; it must not have begun before now."""
+        _check(fault, len(self._faults), self._joints)
+        self._faults = (*self._faults, fault)
+
+    def friction(self, mu: float) -> None:
+        """Gives the contacts of the object the true sliding friction `mu`, which faults may lower."""
+        self._friction[:] = contact_friction(mu)
+        self._scene.model.geom(OBJECT).friction[:] = self._friction
 
     def reset(self) -> None:
         """Forgets what the faults froze or counted, and gives the contacts their friction back."""

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import Command, Measurement, TorquePid
-from fingergait.scenario import Scenario
+from fingergait.scenario import Disturbance, Scenario
 from fingergait.scenario.core_config import core_config
 from fingergait.sim.injection import Injection
-from fingergait.sim.scene import SceneModel, build_scene, torque_limits
+from fingergait.sim.scene import SceneModel, build_scene, set_mass, torque_limits
 from fingergait.sim.sensors import Sensors
 from fingergait.sim.start import nominal_start
 
@@ -60,6 +60,7 @@ class MujocoPlant:
         self._low, self._high = low, high
         self._tau = np.zeros(len(self.scene.q))
         self._object_geoms, self._link_geoms = _parts(self.scene)
+        self._pulses = scenario.disturbance
         self.t = 0.0
         self.reset()
 
@@ -93,12 +94,12 @@ class MujocoPlant:
     def _drive(self, tau: Array) -> None:
         """Drives the motors to the joint torques `tau` for one control period."""
         model, data, act, faults = self.scene.model, self.data, self.scene.act, self.injection
-        if self.scenario.disturbance:
+        if self._pulses:
             self._disturb()
         faults.contacts(self.t)
         pull = faults.pull(self.t)
         if pull is not None:
-            if not self.scenario.disturbance:  # which starts anew from zero otherwise
+            if not self._pulses:  # which starts anew from zero otherwise
                 data.xfrc_applied[self.scene.object_body] = 0.0
             data.xfrc_applied[self.scene.object_body, :3] += pull
         desired = faults.command(self.t, tau)
@@ -108,6 +109,20 @@ class MujocoPlant:
             data.ctrl[act] = faults.motors(self.t, motors)
             mujoco.mj_step(model, data)
             self._tau[:] = data.actuator_force[act]
+
+    def change(self, key: str, value: float) -> None:
+        """Changes the truth during the run: a `truth.*` or `sensors.*` key of an input, see `scenario.inputs`."""
+        table, _, field = key.partition(".")
+        if table == "sensors":
+            self.sensors.change(field, value)
+        elif field == "friction":
+            self.injection.friction(value)
+        else:
+            set_mass(self.scene, self.scenario.object.mass * value)
+
+    def push(self, pulse: Disturbance) -> None:
+        """Takes one more pulse on the object; it must not have begun before now."""
+        self._pulses = (*self._pulses, pulse)
 
     def close(self) -> None:
         """Switches the motors off."""
@@ -138,7 +153,7 @@ class MujocoPlant:
     def _disturb(self) -> None:
         """Applies the pulses that act now; MuJoCo takes the force at the centre of mass, the scenario gives it at O."""
         wrench = np.zeros(6)
-        for pulse in self.scenario.disturbance:
+        for pulse in self._pulses:
             if pulse.at - 1e-9 <= self.t < pulse.at + pulse.duration - 1e-9:
                 wrench += [*pulse.force, *pulse.torque]
         body = self.scene.object_body

@@ -115,6 +115,17 @@ def torque_limits(scene: SceneModel) -> tuple[NDArray[np.float64], NDArray[np.fl
     return low.copy(), high.copy()
 
 
+def contact_friction(mu: float) -> NDArray[np.float64]:
+    """Sliding, torsional and rolling friction (3,) of the object's contacts at the sliding coefficient `mu`."""
+    return mu * np.array([1.0, _TORSION, _ROLLING])
+
+
+def set_mass(scene: SceneModel, mass: float) -> None:
+    """Gives the true object another mass, kg, while the simulation goes on; its moments of inertia stay."""
+    scene.model.body_mass[scene.object_body] = mass
+    mujoco.mj_setConst(scene.model, mujoco.MjData(scene.model))  # the state of the run is not touched
+
+
 def true_inertia(scenario: Scenario) -> NDArray[np.float64]:
     """Principal moments (3,) of the true object, kg m^2; refuses moments that no body can have."""
     inertia: NDArray[np.float64] = scenario.object.geometry.inertia(scenario.object.mass)
@@ -164,7 +175,7 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: Hand) -> None:
     geom.contype, geom.conaffinity = int(np.bitwise_or.reduce(model.geom_conaffinity)) or 1, types
     geom.priority = 1  # so that the contact takes the object's friction and not the larger of the two
     geom.condim = max(4, int(model.geom_condim[tip]))
-    geom.friction = truth.friction * np.array([1.0, _TORSION, _ROLLING])
+    geom.friction = contact_friction(truth.friction)
     geom.solref = model.geom_solref[tip]
     geom.solimp = model.geom_solimp[tip]
     geom.rgba = np.array([0.80, 0.47, 0.25, 1.0])

@@ -67,6 +67,10 @@ class Sensors:
         self._seen = np.zeros(7)  # the newest pose that has come in, before faults
         self._bias = config.contact_force_bias, np.array(config.contact_place_bias)
 
+    def change(self, key: str, value: float) -> None:
+        """Replaces one number of the errors, `SensorConfig`'s `key`, from the next measurement on."""
+        self._config = self._config.model_copy(update={key: value})
+
     @staticmethod
     def columns(fingers: list[str], counts: list[int]) -> list[str]:
         """Names of the numbers in `row`, for fingers with so many joints each."""

@@ -53,7 +53,7 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
     n = len(scene.fingers)
     turns = np.deg2rad(_per_finger(scenario.truth.finger_offset_deg, n, "truth.finger_offset_deg"))
     heights = _per_finger(scenario.truth.finger_height_offset, n, "truth.finger_height_offset")
-    _set_joints(scene, data, model.jnt_range[_joints(scene)].mean(axis=1))
+    set_joints(scene, data, model.jnt_range[_joints(scene)].mean(axis=1))
     mujoco.mj_kinematics(model, data)
     data.qpos[scene.object_q : scene.object_q + 7] = _object_pose(scene, data, scenario)
     mujoco.mj_kinematics(model, data)
@@ -63,7 +63,7 @@ def nominal_start(scene: SceneModel, scenario: Scenario) -> Start:
         if len(scenario.grasp.joints) != len(scene.q):
             found = len(scenario.grasp.joints)
             raise ConfigError(f"grasp.joints: expected {len(scene.q)} angles, one for each joint, found {found}")
-        _set_joints(scene, data, np.array(scenario.grasp.joints))
+        set_joints(scene, data, np.array(scenario.grasp.joints))
         mujoco.mj_kinematics(model, data)
         _check_clear(scene, data)
         return Start(data.qpos.copy(), _held(scene, data, scenario.grasp.press))
@@ -89,7 +89,7 @@ def _joints(scene: SceneModel) -> list[int]:
     return [joint for finger in scene.fingers for joint in finger.joints]
 
 
-def _set_joints(scene: SceneModel, data: mujoco.MjData, q: Array) -> None:
+def set_joints(scene: SceneModel, data: mujoco.MjData, q: Array) -> None:
     """Moves the independent joints to `q`, rad, and those that follow them along."""
     data.qpos[scene.q] = q
     address = scene.model.jnt_qposadr
@@ -177,7 +177,7 @@ def _reach(scene: SceneModel, data: mujoco.MjData, index: int, target: Array) ->
         step = J.T @ np.linalg.solve(J @ J.T + 1e-6 * np.eye(3), error)
         moved = data.qpos[scene.q].copy()
         moved[scene.joints[index]] = np.clip(data.qpos[q] + np.clip(step, -0.3, 0.3), lower, upper)
-        _set_joints(scene, data, moved)
+        set_joints(scene, data, moved)
     _touch_near(scene, data, index, target)
 
 
@@ -190,7 +190,7 @@ def _touch_near(scene: SceneModel, data: mujoco.MjData, index: int, target: Arra
     def away(q: Array) -> Array:
         moved = data.qpos[scene.q].copy()
         moved[own] = q
-        _set_joints(scene, data, moved)
+        set_joints(scene, data, moved)
         mujoco.mj_kinematics(model, data)
         apart = _distance(model, data, tip, geom) + _DEPTH
         return np.array([_TOUCH_WEIGHT * apart, *(data.geom_xpos[tip] - target)])
