@@ -20,6 +20,7 @@ from fingergait.run.log import Log, columns, describe
 from fingergait.run.loss import LossMonitor, reason
 from fingergait.run.metrics import Timing, metrics_of
 from fingergait.run.progress import RunProgress, in_notebook
+from fingergait.run.regrasping import LYING
 from fingergait.run.report.table import table_of
 from fingergait.scenario import Scenario
 from fingergait.scenario.reference import Trajectory
@@ -143,7 +144,11 @@ def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress) -> Ru
             refused = not _REFUSED.isdisjoint(diagnostics.faults)
             if refused and plant.t >= _REFUSED_S:
                 break
-            if not refused and monitor.update(plant.t, plant.object_pose, pose, plant.sensors.normal_force, standing):
+            # What the object is to do now: what is asked, less what it missed while it was set down.
+            goal = pose if diagnostics.regrasp == "idle" else diagnostics.governed
+            lying = diagnostics.regrasp in LYING
+            felt = plant.sensors.normal_force
+            if not refused and monitor.update(plant.t, plant.object_pose, goal, felt, standing, lying):
                 lost = reason(log, scene, monitor.symptom)
                 break
         if k % watch_every == 0:

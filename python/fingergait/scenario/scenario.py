@@ -1,7 +1,7 @@
 """A scenario: plant, reference, disturbances and the errors of the model, read from TOML and checked.
 
-The tables `gait`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
-on as they are, and the core refuses what it doesn't know.
+The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they
+are passed on as they are, and the core refuses what it doesn't know.
 """
 
 import json
@@ -197,6 +197,7 @@ class Scenario(Table):
     disturbance: tuple[Disturbance, ...] = ()
     fault: tuple[Fault, ...] = ()
     gait: dict[str, Any] = {}
+    regrasp: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
     robust: dict[str, Any] = {}

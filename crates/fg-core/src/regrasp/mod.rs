@@ -1,0 +1,555 @@
+//! The second way to change contacts: set the object down, take it again elsewhere, go on.
+//!
+//! Not in the paper, whose gait needs a finger that the others can do without. Hands of three fingers have none to spare, nor
+//! has a hand at the limit of friction or torque. Here the object is set down on what it was lifted from, all fingers go
+//! back round it, and lift it again. Only the paper's sensors are used: that the object lies is felt, in the wrench that K
+//! asks for and in how far the object stays behind its reference, both at once; how high the support is, is known from the
+//! first lift, and then from each time it was felt.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`phase`] | the phases |
+//! | [`config`] | every length, force and time, as shares of contact radius and weight |
+//! | [`governor`] | the reference: what is asked, with the turn that was missed while the object lay |
+//! | [`path`] | the way of a fingertip round the object |
+//! | [`arms`] | the servo of fingers that are off the object |
+//! | [`reach`] | the fingers between two grasps: return, approach, wait |
+
+pub mod arms;
+pub mod config;
+pub mod governor;
+pub mod path;
+pub mod phase;
+pub mod reach;
+
+use crate::grasp::Grasp;
+use crate::hand::{HandModel, HandState, TorqueLimits};
+use crate::signals::Reference;
+use crate::spatial::{angular, linear, pose_error};
+use config::{Change, RegraspConfig};
+use governor::Governor;
+use nalgebra::{Isometry3, Vector3, Vector6};
+use path::{smooth, Axis};
+use phase::Phase;
+use reach::Reach;
+
+/// Standard acceleration of gravity, the unit of accelerations, m/s^2.
+const G: f64 = 9.81;
+/// Time constant of the filters on forces, torques and the set-down's signs, s.
+const FILTER: f64 = 0.01;
+/// Time constant of the filter on torques that are close to their limits, s.
+const TORQUE_FILTER: f64 = 0.05;
+/// Time for which the signs of a set-down must last, s.
+const FELT: f64 = 0.006;
+/// Share of a lift after which the object turns again.
+const TURNS_FROM: f64 = 0.4;
+/// The object stands still this long before it goes down, s.
+const CALM: f64 = 0.05;
+
+/// Sizes of the first grasp, from which every length and force follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Mean distance of the contacts from the axis, m.
+    pub radius: f64,
+    /// Nominal weight, N.
+    pub weight: f64,
+}
+
+/// What the state machine looks at.
+#[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
+pub struct View<'a> {
+    /// The hand.
+    pub hand: &'a HandModel,
+    /// Its kinematics.
+    pub state: &'a HandState,
+    /// Contacts.
+    pub grasp: &'a Grasp,
+    /// Joint angles, rad.
+    pub q: &'a [f64],
+    /// Pose of the object.
+    pub X_WO: &'a Isometry3<f64>,
+    /// What is asked of it.
+    pub asked: &'a Reference,
+    /// The wrench that the last step asked for, its mean of late, and what the force optimiser failed to deliver.
+    pub F_des: &'a Vector6<f64>,
+    /// See `F_des`.
+    pub steady: &'a Vector6<f64>,
+    /// See `F_des`.
+    pub psi: &'a Vector6<f64>,
+    /// The last command and its limits, N m.
+    pub tau: &'a [f64],
+    /// See `tau`.
+    pub limits: &'a TorqueLimits,
+    /// The friction coefficient that is assumed.
+    pub friction: f64,
+    /// The nominal weight, N.
+    pub weight: f64,
+    /// All fingers have held the object once.
+    pub grasped: bool,
+    /// Nothing is wrong but, at most, the grasp.
+    pub fit: bool,
+    /// What is asked stands because something is wrong.
+    pub stands: bool,
+    /// Some finger's motors give nothing: what is in the air may not stay there.
+    pub weak: bool,
+    /// The grasp is: a torque at its limit, or the wrench not delivered, for long.
+    pub strained: bool,
+    /// No finger can be spared although the grasp asks for it.
+    pub overdue: bool,
+}
+
+/// See the module. All memory is allocated in [`Regrasp::new`].
+#[derive(Debug, Clone)]
+pub struct Regrasp {
+    config: RegraspConfig,
+    change: Change,
+    dt: f64,
+    phase: Phase,
+    /// Time in the phase, s.
+    elapsed: f64,
+    governor: Governor,
+    reach: Reach,
+    up: Vector3<f64>,
+    scale: Option<Scale>,
+    /// Height of the object's origin when it lay last, m, and which way in the object was up.
+    rest: f64,
+    up_O: Vector3<f64>,
+    /// Where its origin is, behind the noise, m.
+    place: Vector3<f64>,
+    /// Where the fingers are, against the first grasp, rad: they turn with the object.
+    azimuth: f64,
+    /// Turn of this grasp so far, rad.
+    turned: f64,
+    /// Grasps that have failed in a row.
+    failed: u32,
+    /// Duration of this lift, s.
+    lift_time: f64,
+    /// No support was found by this lowering.
+    unsupported: bool,
+    /// Filtered vertical force, N, and for how long the signs of a set-down have lasted, s.
+    force: f64,
+    felt: f64,
+    /// Vertical force in the air, N.
+    force_in_air: f64,
+    /// Filtered torques, N m.
+    tau: Vec<f64>,
+    /// Share of the weight that the fingers carry.
+    share: f64,
+    share_from: f64,
+    /// Normal force on top of what the wrench needs, N.
+    squeeze: f64,
+    squeeze_from: f64,
+    /// Set-downs so far.
+    count: u64,
+    out: Reference,
+}
+
+/// What a step of [`Regrasp`] tells the control step to do at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Orders {
+    /// The object is about to go down: learn the wrench that holds it.
+    pub learn: bool,
+    /// The fingers press again: start from the forces that they feel.
+    pub seize: bool,
+    /// K is out of the loop, or in it again: it starts at rest.
+    pub restart: bool,
+}
+
+impl Regrasp {
+    /// A state machine for `hand` at the control period `dt`.
+    pub fn new(hand: &HandModel, config: &RegraspConfig, change: Change, dt: f64) -> Self {
+        let still = Reference { X_WD: Isometry3::identity(), V_WD: Vector6::zeros() };
+        Self {
+            config: config.clone(),
+            change,
+            dt,
+            phase: Phase::Idle,
+            elapsed: 0.0,
+            governor: Governor::new(dt),
+            reach: Reach::new(hand, config, dt),
+            up: hand.up(),
+            scale: None,
+            rest: 0.0,
+            up_O: Vector3::z(),
+            place: Vector3::zeros(),
+            azimuth: 0.0,
+            turned: 0.0,
+            failed: 0,
+            lift_time: 0.0,
+            unsupported: false,
+            force: 0.0,
+            felt: 0.0,
+            force_in_air: 0.0,
+            tau: vec![0.0; hand.n_q()],
+            share: 1.0,
+            share_from: 1.0,
+            squeeze: 0.0,
+            squeeze_from: 0.0,
+            count: 0,
+            out: still,
+        }
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        self.enter(Phase::Idle);
+        self.reach.reset();
+        self.scale = None;
+        self.failed = 0;
+        self.force = 0.0;
+        self.tau.fill(0.0);
+        self.share = 1.0;
+        self.squeeze = 0.0;
+        self.count = 0;
+    }
+
+    /// The present phase.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// True where gaits are to be kept from starting: regrasping has taken over, for good.
+    pub fn excludes_gaits(&self) -> bool {
+        self.phase != Phase::Idle
+    }
+
+    /// Share of the object's weight that the fingers carry.
+    pub fn share(&self) -> f64 {
+        self.share
+    }
+
+    /// Normal force of each finger on top of what the wrench needs, N.
+    pub fn squeeze(&self) -> f64 {
+        self.squeeze
+    }
+
+    /// Set-downs so far.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The reference of this step.
+    pub fn reference(&self) -> &Reference {
+        &self.out
+    }
+
+    /// The fingers between two grasps.
+    pub fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
+    /// The object has slipped out of the fingers: it lies, somewhere, and is taken again.
+    pub fn lose(&mut self) {
+        if self.phase != Phase::Idle && !self.phase.is_open() {
+            self.fail();
+            self.enter(Phase::Release);
+            self.share = 0.0;
+            self.squeeze = 0.0;
+        }
+    }
+
+    /// Goes through one step; [`Regrasp::reference`] is then what the object is to do.
+    pub fn step(&mut self, view: &View<'_>) -> Orders {
+        self.reach.observe(view.q);
+        let before = self.phase;
+        self.filter(view);
+        if self.phase == Phase::Idle {
+            self.idle(view);
+        } else if view.fit {
+            self.elapsed += self.dt;
+            self.advance(view);
+        } else {
+            self.freeze(view);
+        }
+        self.out = if self.phase == Phase::Idle {
+            *view.asked
+        } else {
+            let reference = self.governor.reference(view.asked);
+            match self.phase {
+                Phase::Check if before == Phase::Check => self.out,
+                phase if phase.lies() => Reference { X_WD: *view.X_WO, V_WD: Vector6::zeros() },
+                _ => reference,
+            }
+        };
+        let entered = |phase| self.phase == phase && before != phase;
+        Orders {
+            learn: entered(Phase::Lower) && before == Phase::Brake,
+            seize: entered(Phase::Preload),
+            restart: entered(Phase::Release) || entered(Phase::Check),
+        }
+    }
+
+    fn filter(&mut self, view: &View<'_>) {
+        let share = 1.0 - (-self.dt / FILTER).exp();
+        self.force += (linear(view.F_des).dot(&self.up) - self.force) * share;
+        self.place += (view.X_WO.translation.vector - self.place) * share;
+        let share = 1.0 - (-self.dt / TORQUE_FILTER).exp();
+        for (filtered, tau) in self.tau.iter_mut().zip(view.tau) {
+            *filtered += (tau - *filtered) * share;
+        }
+    }
+
+    /// Before regrasping has begun: takes the measure of the first grasp, and waits until it is needed.
+    fn idle(&mut self, view: &View<'_>) {
+        if self.change == Change::Gait || !view.grasped {
+            return;
+        }
+        let height = view.X_WO.translation.vector.dot(&self.up);
+        let Some(scale) = self.scale else {
+            self.scale = self.reach.measure(view, &self.up);
+            self.rest = height;
+            self.up_O = view.X_WO.rotation.inverse() * self.up;
+            return;
+        };
+        let asked = view.asked.X_WD.translation.vector.dot(&self.up);
+        let lifted = (asked - self.rest).min(height - self.rest) > self.config.lift_min * scale.radius;
+        let stands = linear(&view.asked.V_WD).norm() < 1e-3 * scale.radius;
+        let wanted = self.change == Change::Regrasp || view.overdue;
+        if lifted && stands && wanted && view.fit {
+            self.governor.begin(view.asked, &self.up);
+            self.azimuth = 0.0;
+            self.turned = 0.0;
+            self.enter(Phase::Turn);
+        }
+    }
+
+    /// Moves on by one step of a phase.
+    fn advance(&mut self, view: &View<'_>) {
+        let Some(scale) = self.scale else { return };
+        let c = &self.config;
+        let turn_acceleration = c.acceleration * G / scale.radius;
+        match self.phase {
+            Phase::Turn => {
+                let wanted = self.wanted(view, turn_acceleration);
+                let over = self.turn(wanted, turn_acceleration);
+                if over || view.strained || self.at_limits(view) {
+                    self.enter(Phase::Brake);
+                }
+            }
+            Phase::Brake | Phase::Stand => {
+                self.turn(0.0, turn_acceleration);
+                if self.governor.rate().abs() > 0.0 {
+                    self.elapsed = 0.0;
+                } else if self.phase == Phase::Brake && self.elapsed > CALM {
+                    self.force_in_air = linear(view.steady).dot(&self.up);
+                    self.enter(Phase::Lower);
+                }
+            }
+            Phase::Lower => self.lower(view, scale),
+            Phase::Release => {
+                let s = (self.elapsed / c.release_time.max(1e-9)).min(1.0);
+                self.share = self.share_from * (1.0 - s);
+                self.squeeze = self.squeeze_from * (1.0 - s);
+                if s >= 1.0 {
+                    self.let_go(view);
+                }
+            }
+            Phase::Return => {
+                if self.reach.go(view, self.elapsed) {
+                    self.enter(Phase::Approach);
+                }
+            }
+            Phase::Approach => self.approach(view, scale),
+            Phase::Rest => {
+                self.reach.go(view, self.elapsed);
+            }
+            Phase::Preload => {
+                let s = (self.elapsed / c.preload_time.max(1e-9)).min(1.0);
+                let full = self.force_share(c.preload, view.friction) * scale.weight;
+                self.squeeze = self.squeeze_from + (full - self.squeeze_from) * s;
+                if s >= 1.0 {
+                    self.enter(Phase::Check);
+                }
+            }
+            Phase::Check => self.check(view, scale),
+            Phase::Lift => self.lift(view, scale, turn_acceleration),
+            Phase::Idle => {}
+        }
+    }
+
+    fn wanted(&self, view: &View<'_>, acceleration: f64) -> f64 {
+        if view.stands {
+            return 0.0;
+        }
+        self.governor.wanted(view.asked, acceleration)
+    }
+
+    /// Turns the reference at `wanted` rad/s as far as this grasp allows; true where it is at its end.
+    fn turn(&mut self, wanted: f64, acceleration: f64) -> bool {
+        let sense = if wanted < 0.0 { -1.0 } else { 1.0 };
+        let left = (0.5 * self.config.stroke - self.azimuth * sense).max(0.0);
+        let rate = wanted.abs().min((2.0 * acceleration * left).sqrt());
+        self.governor.turn(sense * rate, acceleration);
+        let step = self.governor.rate() * self.dt;
+        self.azimuth += step;
+        self.turned += step;
+        wanted != 0.0 && left < 1e-2
+    }
+
+    /// True where a joint is near the limit that it turns to, or a torque near its own.
+    fn at_limits(&self, view: &View<'_>) -> bool {
+        let c = &self.config;
+        let joint = |(at, q): (usize, &f64)| {
+            let coordinate = view.hand.coordinate(at);
+            let to = if self.reach.velocity(at) > 0.0 { coordinate.upper - q } else { q - coordinate.lower };
+            to < c.joint_margin
+        };
+        let torque = |(at, tau): (usize, &f64)| {
+            let (min, max) = (view.limits.min()[at], view.limits.max()[at]);
+            let limit = if *tau < 0.0 { -min } else { max };
+            limit > 0.0 && tau.abs() > c.torque_share * limit
+        };
+        view.q.iter().enumerate().any(joint) || self.tau.iter().enumerate().any(torque)
+    }
+
+    fn lower(&mut self, view: &View<'_>, scale: Scale) {
+        let c = &self.config;
+        let r = scale.radius;
+        let slower = self.governor.drift_speed(&self.up) - 2.0 * c.acceleration * G * self.dt;
+        self.governor.drift(&self.up, slower.max(-c.lower_speed * r));
+        let height = view.X_WO.translation.vector.dot(&self.up);
+        let reference = self.out.X_WD.translation.vector.dot(&self.up);
+        let lags = height - reference > c.down_lag * r;
+        let light = self.force < c.down_share * self.force_in_air;
+        self.felt = if lags && light { self.felt + self.dt } else { 0.0 };
+        if self.felt >= FELT {
+            self.rest = height;
+            self.count += 1;
+            self.governor.stand();
+            self.reach.halt(view);
+            // The support has taken over already.
+            self.share = (self.force / self.force_in_air.max(1e-9)).clamp(0.0, 1.0);
+            self.enter(Phase::Release);
+        } else if reference < self.rest - c.down_search * r {
+            self.unsupported = true;
+            let height = self.governor.take_back();
+            self.begin_lift(height);
+        }
+    }
+
+    /// The fingers leave the object, for the next grasp or for good.
+    fn let_go(&mut self, view: &View<'_>) {
+        let sense = self.governor.sense();
+        let spread = f64::from(self.failed.div_ceil(2)) * self.config.retry_turn;
+        let aside = if self.failed % 2 == 1 { spread } else { -spread };
+        self.azimuth = -0.5 * self.config.stroke * sense + aside;
+        let rests = self.failed > self.config.attempts;
+        self.reach.leave(view, Axis::new(&self.place, &self.up), self.azimuth, rests);
+        self.enter(if rests { Phase::Rest } else { Phase::Return });
+    }
+
+    fn approach(&mut self, view: &View<'_>, scale: Scale) {
+        let c = &self.config;
+        let (touch, wait) = (c.touch_force, c.wait_force);
+        let touch = self.force_share(touch, view.friction) * scale.weight;
+        let wait = self.force_share(wait, view.friction) * scale.weight;
+        self.reach.approach(view, c.approach_speed * scale.radius, touch, wait);
+        if self.reach.waits() > c.touch_time {
+            self.reach.halt(view);
+            self.squeeze_from = wait;
+            self.enter(Phase::Preload);
+            self.squeeze = wait;
+        } else if self.elapsed > c.approach_time {
+            self.fail();
+            self.share_from = 0.0;
+            self.let_go(view);
+        }
+    }
+
+    fn check(&mut self, view: &View<'_>, scale: Scale) {
+        let c = &self.config;
+        let s = (self.elapsed / c.check_time).min(1.0);
+        self.share = s;
+        if self.elapsed < 2.0 * c.check_time {
+            return;
+        }
+        let W = scale.weight;
+        let delivered =
+            linear(view.psi).norm() <= c.slack * W && angular(view.psi).norm() <= c.slack * W * scale.radius;
+        let touching = view.grasp.contacts().iter().all(|contact| contact.touching);
+        if delivered && touching {
+            self.reach.remember(view, &self.up);
+            let height = self.governor.pick_up(view.asked, view.X_WO);
+            self.turned = 0.0;
+            self.begin_lift(height);
+        } else {
+            self.fail();
+            self.enter(Phase::Release);
+        }
+    }
+
+    fn begin_lift(&mut self, height: f64) {
+        self.lift_time = (path::PEAK * height / (self.config.acceleration * G)).sqrt().max(0.1);
+        self.enter(Phase::Lift);
+    }
+
+    fn lift(&mut self, view: &View<'_>, scale: Scale, acceleration: f64) {
+        let s = self.elapsed / self.lift_time;
+        let (share, rate) = smooth(s);
+        self.governor.lift(share, rate / self.lift_time);
+        self.squeeze = self.squeeze_from * (1.0 - s).max(0.0);
+        if s > TURNS_FROM && !self.unsupported {
+            let wanted = self.wanted(view, acceleration);
+            self.turn(wanted, acceleration);
+        }
+        let error = linear(&pose_error(&self.out.X_WD, view.X_WO)).norm();
+        if s >= 1.0 {
+            self.governor.land();
+            self.squeeze = 0.0;
+            self.failed = 0;
+            self.enter(if self.unsupported { Phase::Stand } else { Phase::Turn });
+        } else if error > self.config.lift_error * scale.radius {
+            self.fail();
+            self.force_in_air = scale.weight;
+            self.governor.drift(&self.up, 0.0);
+            self.governor.stand();
+            self.enter(Phase::Lower);
+        }
+    }
+
+    /// What a fault leaves to do: what is in the air is held there, what lies is left alone.
+    fn freeze(&mut self, view: &View<'_>) {
+        match self.phase {
+            Phase::Return | Phase::Approach | Phase::Rest => self.reach.halt(view),
+            Phase::Preload | Phase::Check => self.enter(Phase::Release),
+            Phase::Release => {
+                self.elapsed += self.dt;
+                let left = (1.0 - self.elapsed / self.config.release_time.max(1e-9)).max(0.0);
+                self.share = self.share_from * left;
+                self.squeeze = self.squeeze_from * left;
+            }
+            Phase::Lower if view.weak => {
+                if let Some(scale) = self.scale {
+                    self.lower(view, scale);
+                }
+            }
+            Phase::Turn | Phase::Brake | Phase::Lift if view.weak => {
+                self.governor.stand();
+                self.force_in_air = view.weight;
+                self.enter(Phase::Lower);
+            }
+            _ => self.governor.stand(),
+        }
+    }
+
+    /// A share of the weight that does not push the object over its support.
+    fn force_share(&self, share: f64, friction: f64) -> f64 {
+        share * (friction / self.config.preload).min(1.0)
+    }
+
+    fn fail(&mut self) {
+        self.failed = self.failed.saturating_add(1);
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.elapsed = 0.0;
+        self.felt = 0.0;
+        self.share_from = self.share;
+        self.squeeze_from = self.squeeze;
+        if matches!(phase, Phase::Turn | Phase::Idle) {
+            self.unsupported = false;
+        }
+    }
+}
