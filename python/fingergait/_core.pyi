@@ -260,7 +260,7 @@ class Diagnostics:
     def regrasp_phase_names() -> list[str]:
         """Names of the phases of regrasping: that of number k is k in the column `regrasp` of a log."""
     @property
-    def governed(self) -> Array:
+    def governed(self) -> _Array:
         """Pose (7,) in W that the object is to have now: what is asked, less what was missed while it lay."""
     @property
     def quality(self) -> float:

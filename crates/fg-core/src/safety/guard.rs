@@ -361,7 +361,7 @@ impl Guard {
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
         self.touch.admit(tactile, elapsed, at, using, trusted, &mut self.faults);
         let efforts = Efforts { tau: measurement.tau.as_slice(), own: plan.own, J: plan.J };
-        let holds = |j: usize| plan.free != Some(j) && motors.drives(j) && self.joints.trusts(j);
+        let holds = |j: usize| !plan.frees(j) && motors.drives(j) && self.joints.trusts(j);
         self.effort.admit(tactile, &efforts, |j| hand.joints(j), holds);
         self.faults.insert_if(self.effort.failed(), Fault::TactileScale);
     }
