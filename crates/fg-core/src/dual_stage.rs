@@ -193,7 +193,7 @@ impl DualStagePlanner {
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
             open: (!self.controls()).then(|| self.regrasp.reach().qd_des()),
-            grasped: self.supervisor.threshold().is_some() && self.controls(),
+            grasped: self.supervisor.threshold().is_some(),
             own: self.tau_own.as_slice(),
             J: &self.grasp.J,
         };

@@ -404,7 +404,7 @@ impl Guard {
         let fingers = self.trusted.tactile.len();
         let touching = self.trusted.tactile.iter().filter(|reading| reading.f_n > 0.0).count();
         let enough = if conditions.gone.confirmed() { 2 } else { 1 };
-        let gone = plan.grasped && touching < enough;
+        let gone = plan.grasped && plan.open.is_none() && touching < enough;
         let gone = conditions.gone.update(gone, dt, c.contacts_timeout, c.recovery_time);
         self.faults.insert_if(gone, Fault::ContactsLost);
         let seeks = |j: usize| plan.pressing && self.trusted.tactile[j].f_n <= 0.0 && self.motors.drives(j);
