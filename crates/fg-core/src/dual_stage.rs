@@ -226,6 +226,7 @@ impl DualStagePlanner {
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
+        self.judge_spares();
         if self.allows_gaits() {
             self.choose_finger(measurement, &F_des);
         }
@@ -311,7 +312,7 @@ impl DualStagePlanner {
     }
 
     /// What the fingers fail to deliver, as a multiple of what a gait allows.
-    fn overload(&self, psi: &Vector6<f64>) -> f64 {
+    pub(super) fn overload(&self, psi: &Vector6<f64>) -> f64 {
         let gait = &self.config.gait;
         (linear(psi).norm() / gait.slack_force).max(angular(psi).norm() / gait.slack_torque)
     }
@@ -360,17 +361,21 @@ impl DualStagePlanner {
         let promises = |k| planner.potential(k, quality, &scene) > delta;
         let now = self.diagnostics.quality;
         let Some(k) = self.supervisor.candidate(&now, quality, &scene, promises) else { return };
-        self.f_limit.fill(self.config.force.f_n_max);
-        self.f_limit[k] = 0.0;
-        let scale = self.wrench_scale();
-        let F = F_des.component_mul(&scale);
-        let psi =
-            self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale));
-        if psi.is_ok_and(|psi| self.overload(&psi) <= 1.0) {
+        let psi = self.slack_without(k, F_des);
+        if psi.is_some_and(|psi| self.overload(&psi) <= 1.0) {
             self.supervisor.start(k, &self.grasp);
         } else {
             self.supervisor.refuse(k);
         }
+    }
+
+    /// What the others fail to deliver of the wrench `F` without finger `k`; None where no solver says.
+    pub(super) fn slack_without(&mut self, k: usize, F: &Vector6<f64>) -> Option<Vector6<f64>> {
+        self.f_limit.fill(self.config.force.f_n_max);
+        self.f_limit[k] = 0.0;
+        let scale = self.wrench_scale();
+        let F = F.component_mul(&scale);
+        self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale)).ok()
     }
 
     /// Eq. (8), with the free finger's force ramped or taken out.

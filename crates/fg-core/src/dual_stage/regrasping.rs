@@ -51,6 +51,15 @@ impl DualStagePlanner {
         *self.regrasp.reference()
     }
 
+    /// Finds out whether any finger can be spared, one finger a step, where that decides how contacts are changed.
+    pub(super) fn judge_spares(&mut self) {
+        let Some(k) = self.regrasp.doubt() else { return };
+        let F = *self.steady.wrench();
+        let psi = self.slack_without(k, &F);
+        let spared = psi.is_some_and(|psi| self.overload(&psi) <= 1.0 && self.regrasp.delivers(&psi));
+        self.regrasp.judge(spared);
+    }
+
     /// True where gaits may begin and go on.
     pub(super) fn allows_gaits(&self) -> bool {
         self.guard.allows_gaits() && !self.regrasp.excludes_gaits()

@@ -10,7 +10,7 @@ use crate::spatial::{angular, linear, pose_error};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
 /// Asked turns slower than this are none, rad/s.
-const STANDS: f64 = 1e-3;
+pub const STANDS: f64 = 1e-3;
 
 /// See the module.
 #[derive(Debug, Clone)]

@@ -115,6 +115,11 @@ pub struct Regrasp {
     /// Height of the object's origin when it lay last, m, and which way in the object was up.
     rest: f64,
     up_O: Vector3<f64>,
+    /// How many fingers were asked for so far whether the others can hold without them, and whether one can be spared.
+    judged: usize,
+    spared: bool,
+    /// The finger to ask for in this step.
+    doubt: Option<usize>,
     /// Where its origin is, behind the noise, m.
     place: Vector3<f64>,
     /// Where the fingers are, against the first grasp, rad: they turn with the object.
@@ -172,6 +177,9 @@ impl Regrasp {
             scale: None,
             rest: 0.0,
             up_O: Vector3::z(),
+            judged: 0,
+            spared: false,
+            doubt: None,
             place: Vector3::zeros(),
             azimuth: 0.0,
             turned: 0.0,
@@ -196,6 +204,9 @@ impl Regrasp {
         self.enter(Phase::Idle);
         self.reach.reset();
         self.scale = None;
+        self.judged = 0;
+        self.spared = false;
+        self.doubt = None;
         self.failed = 0;
         self.force = 0.0;
         self.tau.fill(0.0);
@@ -237,6 +248,26 @@ impl Regrasp {
     /// The fingers between two grasps.
     pub fn reach(&self) -> &Reach {
         &self.reach
+    }
+
+    /// The finger of which [`Regrasp::judge`] is to be told whether the others can hold without it.
+    pub fn doubt(&self) -> Option<usize> {
+        self.doubt
+    }
+
+    /// Takes note of whether the finger in doubt can be spared.
+    pub fn judge(&mut self, spared: bool) {
+        self.judged += 1;
+        self.spared |= spared;
+        self.doubt = None;
+    }
+
+    /// True where a grasp that fails to deliver `psi` holds the object well enough.
+    pub fn delivers(&self, psi: &Vector6<f64>) -> bool {
+        self.scale.is_some_and(|scale| {
+            let most = self.config.slack * scale.weight;
+            linear(psi).norm() <= most && angular(psi).norm() <= most * scale.radius
+        })
     }
 
     /// The object has slipped out of the fingers: it lies, somewhere, and is taken again.
@@ -305,8 +336,14 @@ impl Regrasp {
         let asked = view.asked.X_WD.translation.vector.dot(&self.up);
         let lifted = (asked - self.rest).min(height - self.rest) > self.config.lift_min * scale.radius;
         let stands = linear(&view.asked.V_WD).norm() < 1e-3 * scale.radius;
-        let wanted = self.change == Change::Regrasp || view.overdue;
-        if lifted && stands && wanted && view.fit {
+        let ready = lifted && stands && view.fit;
+        let n = view.hand.n_fingers();
+        let turns = angular(&view.asked.V_WD).dot(&self.up).abs() > governor::STANDS;
+        let open = self.change == Change::Auto && turns && self.judged < n && !self.spared;
+        self.doubt = (open && ready).then_some(self.judged);
+        let spareless = self.judged == n && !self.spared;
+        let wanted = self.change == Change::Regrasp || view.overdue || spareless;
+        if ready && wanted {
             self.governor.begin(view.asked, &self.up);
             self.azimuth = 0.0;
             self.turned = 0.0;
@@ -362,7 +399,7 @@ impl Regrasp {
                     self.enter(Phase::Check);
                 }
             }
-            Phase::Check => self.check(view, scale),
+            Phase::Check => self.check(view),
             Phase::Lift => self.lift(view, scale, turn_acceleration),
             Phase::Idle => {}
         }
@@ -457,16 +494,14 @@ impl Regrasp {
         }
     }
 
-    fn check(&mut self, view: &View<'_>, scale: Scale) {
+    fn check(&mut self, view: &View<'_>) {
         let c = &self.config;
         let s = (self.elapsed / c.check_time).min(1.0);
         self.share = s;
         if self.elapsed < 2.0 * c.check_time {
             return;
         }
-        let W = scale.weight;
-        let delivered =
-            linear(view.psi).norm() <= c.slack * W && angular(view.psi).norm() <= c.slack * W * scale.radius;
+        let delivered = self.delivers(view.psi);
         let touching = view.grasp.contacts().iter().all(|contact| contact.touching);
         if delivered && touching {
             self.reach.remember(view, &self.up);
