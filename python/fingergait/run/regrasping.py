@@ -15,6 +15,8 @@ from fingergait.run.pose_error import pose_errors, yaw_reached
 PHASES = Diagnostics.regrasp_phase_names()
 LYING = frozenset({"release", "return", "approach", "preload", "check", "rest"})
 """Phases in which the support carries the object, or part of it."""
+LEFT = frozenset({"stand", "rest"})
+"""Phases in which the object is not taken any further: it is held where it is, or lies."""
 
 _HELD = ("turn", "brake", "stand")
 _CLEAR = 5e-4  # m above where the object lay at the start, from which on it is in the air
