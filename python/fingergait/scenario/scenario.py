@@ -33,10 +33,18 @@ class HandConfig(Table):
 
 
 class SupportConfig(Table):
-    """A table below the object: height of its top, m (absent: none), and where its middle is, m."""
+    """A table below the object: height of its top, m (absent: none), and where its middle is, m.
+
+    tilt_deg
+        Its tilt, a rotation vector about x and y through the middle of its top, degrees.
+    softness
+        How many times softer than the fingertips its contact is, at the same share of critical damping.
+    """
 
     height: float | None = None
     position: tuple[float, float] = (0.0, 0.0)
+    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    softness: Positive = 1.0
 
 
 class ObjectConfig(Table):

@@ -2,7 +2,7 @@
 
 use super::DualStagePlanner;
 use crate::regrasp::phase::Phase;
-use crate::regrasp::View;
+use crate::regrasp::view::View;
 use crate::safety::SafeMode;
 use crate::signals::{Measurement, Reference};
 
@@ -53,11 +53,11 @@ impl DualStagePlanner {
 
     /// Finds out whether any finger can be spared, one finger a step, where that decides how contacts are changed.
     pub(super) fn judge_spares(&mut self) {
-        let Some(k) = self.regrasp.doubt() else { return };
+        let Some(k) = self.regrasp.spares().doubt() else { return };
         let F = *self.steady.wrench();
         let psi = self.slack_without(k, &F);
         let spared = psi.is_some_and(|psi| self.overload(&psi) <= 1.0 && self.regrasp.delivers(&psi));
-        self.regrasp.judge(spared);
+        self.regrasp.spares().answer(spared);
     }
 
     /// True where gaits may begin and go on.

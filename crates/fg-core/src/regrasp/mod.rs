@@ -14,24 +14,29 @@
 //! | [`path`] | the way of a fingertip round the object |
 //! | [`arms`] | the servo of fingers that are off the object |
 //! | [`reach`] | the fingers between two grasps: return, approach, wait |
+//! | [`spares`] | whether any finger can be spared |
+//! | [`view`], `cycle` | what a step looks at; the phases between two turns |
 
 pub mod arms;
 pub mod config;
+mod cycle;
 pub mod governor;
 pub mod path;
 pub mod phase;
 pub mod reach;
+pub mod spares;
+pub mod view;
 
-use crate::grasp::Grasp;
-use crate::hand::{HandModel, HandState, TorqueLimits};
+use crate::hand::HandModel;
 use crate::signals::Reference;
-use crate::spatial::{angular, linear, pose_error};
+use crate::spatial::{angular, linear};
 use config::{Change, RegraspConfig};
 use governor::Governor;
 use nalgebra::{Isometry3, Vector3, Vector6};
-use path::{smooth, Axis};
 use phase::Phase;
 use reach::Reach;
+use spares::Spares;
+use view::View;
 
 /// Standard acceleration of gravity, the unit of accelerations, m/s^2.
 const G: f64 = 9.81;
@@ -55,50 +60,6 @@ pub struct Scale {
     pub weight: f64,
 }
 
-/// What the state machine looks at.
-#[derive(Debug, Clone, Copy)]
-#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
-pub struct View<'a> {
-    /// The hand.
-    pub hand: &'a HandModel,
-    /// Its kinematics.
-    pub state: &'a HandState,
-    /// Contacts.
-    pub grasp: &'a Grasp,
-    /// Joint angles, rad.
-    pub q: &'a [f64],
-    /// Pose of the object.
-    pub X_WO: &'a Isometry3<f64>,
-    /// What is asked of it.
-    pub asked: &'a Reference,
-    /// The wrench that the last step asked for, its mean of late, and what the force optimiser failed to deliver.
-    pub F_des: &'a Vector6<f64>,
-    /// See `F_des`.
-    pub steady: &'a Vector6<f64>,
-    /// See `F_des`.
-    pub psi: &'a Vector6<f64>,
-    /// The last command and its limits, N m.
-    pub tau: &'a [f64],
-    /// See `tau`.
-    pub limits: &'a TorqueLimits,
-    /// The friction coefficient that is assumed.
-    pub friction: f64,
-    /// The nominal weight, N.
-    pub weight: f64,
-    /// All fingers have held the object once.
-    pub grasped: bool,
-    /// Nothing is wrong but, at most, the grasp.
-    pub fit: bool,
-    /// What is asked stands because something is wrong.
-    pub stands: bool,
-    /// Some finger's motors give nothing: what is in the air may not stay there.
-    pub weak: bool,
-    /// The grasp is: a torque at its limit, or the wrench not delivered, for long.
-    pub strained: bool,
-    /// No finger can be spared although the grasp asks for it.
-    pub overdue: bool,
-}
-
 /// See the module. All memory is allocated in [`Regrasp::new`].
 #[derive(Debug, Clone)]
 pub struct Regrasp {
@@ -112,20 +73,13 @@ pub struct Regrasp {
     reach: Reach,
     up: Vector3<f64>,
     scale: Option<Scale>,
-    /// Height of the object's origin when it lay last, m, and which way in the object was up.
+    /// Height of the object's origin when it lay last, m.
     rest: f64,
-    up_O: Vector3<f64>,
-    /// How many fingers were asked for so far whether the others can hold without them, and whether one can be spared.
-    judged: usize,
-    spared: bool,
-    /// The finger to ask for in this step.
-    doubt: Option<usize>,
+    spares: Spares,
     /// Where its origin is, behind the noise, m.
     place: Vector3<f64>,
     /// Where the fingers are, against the first grasp, rad: they turn with the object.
     azimuth: f64,
-    /// Turn of this grasp so far, rad.
-    turned: f64,
     /// Grasps that have failed in a row.
     failed: u32,
     /// Duration of this lift, s.
@@ -176,13 +130,9 @@ impl Regrasp {
             up: hand.up(),
             scale: None,
             rest: 0.0,
-            up_O: Vector3::z(),
-            judged: 0,
-            spared: false,
-            doubt: None,
+            spares: Spares::default(),
             place: Vector3::zeros(),
             azimuth: 0.0,
-            turned: 0.0,
             failed: 0,
             lift_time: 0.0,
             unsupported: false,
@@ -204,9 +154,7 @@ impl Regrasp {
         self.enter(Phase::Idle);
         self.reach.reset();
         self.scale = None;
-        self.judged = 0;
-        self.spared = false;
-        self.doubt = None;
+        self.spares = Spares::default();
         self.failed = 0;
         self.force = 0.0;
         self.tau.fill(0.0);
@@ -250,16 +198,9 @@ impl Regrasp {
         &self.reach
     }
 
-    /// The finger of which [`Regrasp::judge`] is to be told whether the others can hold without it.
-    pub fn doubt(&self) -> Option<usize> {
-        self.doubt
-    }
-
-    /// Takes note of whether the finger in doubt can be spared.
-    pub fn judge(&mut self, spared: bool) {
-        self.judged += 1;
-        self.spared |= spared;
-        self.doubt = None;
+    /// Which finger is in doubt.
+    pub fn spares(&mut self) -> &mut Spares {
+        &mut self.spares
     }
 
     /// True where a grasp that fails to deliver `psi` holds the object well enough.
@@ -330,23 +271,19 @@ impl Regrasp {
         let Some(scale) = self.scale else {
             self.scale = self.reach.measure(view, &self.up);
             self.rest = height;
-            self.up_O = view.X_WO.rotation.inverse() * self.up;
             return;
         };
         let asked = view.asked.X_WD.translation.vector.dot(&self.up);
         let lifted = (asked - self.rest).min(height - self.rest) > self.config.lift_min * scale.radius;
         let stands = linear(&view.asked.V_WD).norm() < 1e-3 * scale.radius;
         let ready = lifted && stands && view.fit;
-        let n = view.hand.n_fingers();
         let turns = angular(&view.asked.V_WD).dot(&self.up).abs() > governor::STANDS;
-        let open = self.change == Change::Auto && turns && self.judged < n && !self.spared;
-        self.doubt = (open && ready).then_some(self.judged);
-        let spareless = self.judged == n && !self.spared;
-        let wanted = self.change == Change::Regrasp || view.overdue || spareless;
+        self.spares.ask(self.change == Change::Auto && turns && ready, view.hand.n_fingers());
+        let wanted =
+            self.change == Change::Regrasp || view.overdue || self.spares.none(view.hand.n_fingers());
         if ready && wanted {
             self.governor.begin(view.asked, &self.up);
             self.azimuth = 0.0;
-            self.turned = 0.0;
             self.enter(Phase::Turn);
         }
     }
@@ -420,7 +357,6 @@ impl Regrasp {
         self.governor.turn(sense * rate, acceleration);
         let step = self.governor.rate() * self.dt;
         self.azimuth += step;
-        self.turned += step;
         wanted != 0.0 && left < 1e-2
     }
 
@@ -438,139 +374,6 @@ impl Regrasp {
             limit > 0.0 && tau.abs() > c.torque_share * limit
         };
         view.q.iter().enumerate().any(joint) || self.tau.iter().enumerate().any(torque)
-    }
-
-    fn lower(&mut self, view: &View<'_>, scale: Scale) {
-        let c = &self.config;
-        let r = scale.radius;
-        let slower = self.governor.drift_speed(&self.up) - 2.0 * c.acceleration * G * self.dt;
-        self.governor.drift(&self.up, slower.max(-c.lower_speed * r));
-        let height = view.X_WO.translation.vector.dot(&self.up);
-        let reference = self.out.X_WD.translation.vector.dot(&self.up);
-        let lags = height - reference > c.down_lag * r;
-        let light = self.force < c.down_share * self.force_in_air;
-        self.felt = if lags && light { self.felt + self.dt } else { 0.0 };
-        if self.felt >= FELT {
-            self.rest = height;
-            self.count += 1;
-            self.governor.stand();
-            self.reach.halt(view);
-            // The support has taken over already.
-            self.share = (self.force / self.force_in_air.max(1e-9)).clamp(0.0, 1.0);
-            self.enter(Phase::Release);
-        } else if reference < self.rest - c.down_search * r {
-            self.unsupported = true;
-            let height = self.governor.take_back();
-            self.begin_lift(height);
-        }
-    }
-
-    /// The fingers leave the object, for the next grasp or for good.
-    fn let_go(&mut self, view: &View<'_>) {
-        let sense = self.governor.sense();
-        let spread = f64::from(self.failed.div_ceil(2)) * self.config.retry_turn;
-        let aside = if self.failed % 2 == 1 { spread } else { -spread };
-        self.azimuth = -0.5 * self.config.stroke * sense + aside;
-        let rests = self.failed > self.config.attempts;
-        self.reach.leave(view, Axis::new(&self.place, &self.up), self.azimuth, rests);
-        self.enter(if rests { Phase::Rest } else { Phase::Return });
-    }
-
-    fn approach(&mut self, view: &View<'_>, scale: Scale) {
-        let c = &self.config;
-        let (touch, wait) = (c.touch_force, c.wait_force);
-        let touch = self.force_share(touch, view.friction) * scale.weight;
-        let wait = self.force_share(wait, view.friction) * scale.weight;
-        self.reach.approach(view, c.approach_speed * scale.radius, touch, wait);
-        if self.reach.waits() > c.touch_time {
-            self.reach.halt(view);
-            self.squeeze_from = wait;
-            self.enter(Phase::Preload);
-            self.squeeze = wait;
-        } else if self.elapsed > c.approach_time {
-            self.fail();
-            self.share_from = 0.0;
-            self.let_go(view);
-        }
-    }
-
-    fn check(&mut self, view: &View<'_>) {
-        let c = &self.config;
-        let s = (self.elapsed / c.check_time).min(1.0);
-        self.share = s;
-        if self.elapsed < 2.0 * c.check_time {
-            return;
-        }
-        let delivered = self.delivers(view.psi);
-        let touching = view.grasp.contacts().iter().all(|contact| contact.touching);
-        if delivered && touching {
-            self.reach.remember(view, &self.up);
-            let height = self.governor.pick_up(view.asked, view.X_WO);
-            self.turned = 0.0;
-            self.begin_lift(height);
-        } else {
-            self.fail();
-            self.enter(Phase::Release);
-        }
-    }
-
-    fn begin_lift(&mut self, height: f64) {
-        self.lift_time = (path::PEAK * height / (self.config.acceleration * G)).sqrt().max(0.1);
-        self.enter(Phase::Lift);
-    }
-
-    fn lift(&mut self, view: &View<'_>, scale: Scale, acceleration: f64) {
-        let s = self.elapsed / self.lift_time;
-        let (share, rate) = smooth(s);
-        self.governor.lift(share, rate / self.lift_time);
-        self.squeeze = self.squeeze_from * (1.0 - s).max(0.0);
-        if s > TURNS_FROM && !self.unsupported {
-            let wanted = self.wanted(view, acceleration);
-            self.turn(wanted, acceleration);
-        }
-        let error = linear(&pose_error(&self.out.X_WD, view.X_WO)).norm();
-        if s >= 1.0 {
-            self.governor.land();
-            self.squeeze = 0.0;
-            self.failed = 0;
-            self.enter(if self.unsupported { Phase::Stand } else { Phase::Turn });
-        } else if error > self.config.lift_error * scale.radius {
-            self.fail();
-            self.force_in_air = scale.weight;
-            self.governor.drift(&self.up, 0.0);
-            self.governor.stand();
-            self.enter(Phase::Lower);
-        }
-    }
-
-    /// What a fault leaves to do: what is in the air is held there, what lies is left alone.
-    fn freeze(&mut self, view: &View<'_>) {
-        match self.phase {
-            Phase::Return | Phase::Approach | Phase::Rest => self.reach.halt(view),
-            Phase::Preload | Phase::Check => self.enter(Phase::Release),
-            Phase::Release => {
-                self.elapsed += self.dt;
-                let left = (1.0 - self.elapsed / self.config.release_time.max(1e-9)).max(0.0);
-                self.share = self.share_from * left;
-                self.squeeze = self.squeeze_from * left;
-            }
-            Phase::Lower if view.weak => {
-                if let Some(scale) = self.scale {
-                    self.lower(view, scale);
-                }
-            }
-            Phase::Turn | Phase::Brake | Phase::Lift if view.weak => {
-                self.governor.stand();
-                self.force_in_air = view.weight;
-                self.enter(Phase::Lower);
-            }
-            _ => self.governor.stand(),
-        }
-    }
-
-    /// A share of the weight that does not push the object over its support.
-    fn force_share(&self, share: f64, friction: f64) -> f64 {
-        share * (friction / self.config.preload).min(1.0)
     }
 
     fn fail(&mut self) {

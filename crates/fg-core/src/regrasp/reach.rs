@@ -3,7 +3,8 @@
 use super::arms::Arms;
 use super::config::RegraspConfig;
 use super::path::{unwrapped, Axis, Place, Way};
-use super::{Scale, View, G};
+use super::view::View;
+use super::{Scale, G};
 use crate::hand::HandModel;
 use nalgebra::Vector3;
 
