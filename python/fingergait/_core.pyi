@@ -254,6 +254,15 @@ class Diagnostics:
     def phase(self) -> str:
         """Phase of the gait: "hold", "unload", "slide", "press" or "load"."""
     @property
+    def regrasp(self) -> str:
+        """Phase of regrasping: "idle" until it begins, then "turn", "brake", "lower", and so on."""
+    @staticmethod
+    def regrasp_phase_names() -> list[str]:
+        """Names of the phases of regrasping: that of number k is k in the column `regrasp` of a log."""
+    @property
+    def governed(self) -> _Array:
+        """Pose (7,) in W that the object is to have now: what is asked, less what was missed while it lay."""
+    @property
     def quality(self) -> float:
         """Grasp quality Q, eq. (1), dimensionless."""
     @property

@@ -230,7 +230,8 @@ def synthesize(
         "runs/controller.json"
     ),
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Control rate instead of the spec's; its delay keeps its samples.")
+        float | None,
+        typer.Option(metavar="HZ", help="Control rate instead of the spec's; its delay keeps its samples."),
     ] = None,
     as_json: Json = False,
 ) -> None:

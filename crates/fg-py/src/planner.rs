@@ -10,6 +10,7 @@ use fg_core::diagnostics::Diagnostics as CoreDiagnostics;
 use fg_core::dual_stage::DualStagePlanner as Core;
 use fg_core::error::Error;
 use fg_core::hand::HandModel as CoreHand;
+use fg_core::regrasp::phase::Phase as RegraspPhase;
 use fg_core::signals::{Measurement as CoreMeasurement, Reference as CoreReference, Tactile};
 use nalgebra::{DVector, Vector3, Vector6};
 use numpy::{
@@ -160,6 +161,25 @@ impl Diagnostics {
     #[getter]
     fn phase(&self) -> &'static str {
         self.core.phase.as_str()
+    }
+
+    /// Phase of regrasping: "idle" until it begins, then "turn", "brake", "lower", and so on.
+    #[getter]
+    fn regrasp(&self) -> &'static str {
+        self.core.regrasp.as_str()
+    }
+
+    /// Names of the phases of regrasping: that of number k is k in the column `regrasp` of a log.
+    #[staticmethod]
+    fn regrasp_phase_names() -> Vec<&'static str> {
+        RegraspPhase::ALL.iter().map(|phase| phase.as_str()).collect()
+    }
+
+    /// Pose (7,) in W that the object is to have now: what is asked, less what was missed while it lay.
+    #[getter]
+    fn governed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let (p, q) = (self.core.governed.X_WD.translation.vector, self.core.governed.X_WD.rotation.coords);
+        array1(py, &[p.x, p.y, p.z, q.w, q.x, q.y, q.z])
     }
 
     /// Index of the finger whose gait is under way; None while all hold.

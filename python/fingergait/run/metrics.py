@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors, yaw_reached
+from fingergait.run.regrasping import regrasp_metrics
 from fingergait.run.verdict import verdict
 from fingergait.scenario import Disturbance, Scenario
 
@@ -61,6 +62,7 @@ def metrics_of(
             for pulse in scenario.disturbance
         ],
         **gait_metrics(log, scenario),
+        "regrasp": regrasp_metrics(log),
         "saturated_fraction": saturated_fraction(log, scenario, tau_max),
         "deadline_misses": int((timing.step_ns > 1e9 * scenario.period).sum()),
         "solver": timing.solver,

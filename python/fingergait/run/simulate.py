@@ -116,10 +116,10 @@ def _simulate(scenario: Scenario, watch: Watcher | None, bar: RunProgress, every
         solver[diagnostics.solver] += 1
         if k % _CHECK_EVERY == 0:
             standing = diagnostics.safe_mode != "normal"
-            if stepper.refused:
-                if plant.t >= _REFUSED_S:
-                    break
-            elif monitor.update(plant.t, plant.object_pose, stepper.pose, plant.sensors.normal_force, standing):
+            if stepper.refused and plant.t >= _REFUSED_S:
+                break
+            goal, felt, lying = stepper.goal, plant.sensors.normal_force, stepper.lying
+            if not stepper.refused and monitor.update(plant.t, plant.object_pose, goal, felt, standing, lying):
                 lost = reason(log, plant.scene, monitor.symptom)
                 break
         if k % watch_every == 0:

@@ -9,6 +9,7 @@ from fingergait import _core
 from fingergait.hand import model_json
 from fingergait.paths import find
 from fingergait.run.log import columns
+from fingergait.run.regrasping import LYING
 from fingergait.scenario import Disturbance, Input, Scenario
 from fingergait.scenario.faults import FaultWindow
 from fingergait.scenario.reference import Trajectory
@@ -70,6 +71,19 @@ class Stepper:
         """Whether the last `plan` refused to start: nothing is driven yet, and so nothing can be lost."""
         return not _REFUSED.isdisjoint(self.diagnostics.faults)
 
+    @property
+    def goal(self) -> NDArray[np.float64]:
+        """Where the object is to be now, (7,): the desired pose, less what it missed while it was set down."""
+        if self.diagnostics.regrasp == "idle":
+            return self.pose
+        goal: NDArray[np.float64] = self.diagnostics.governed
+        return goal
+
+    @property
+    def lying(self) -> bool:
+        """Whether the object lies on its support, where nobody holds it."""
+        return self.diagnostics.regrasp in LYING
+
     def plan(self) -> _core.Diagnostics:
         """Answers the newest measurement: the inputs that are due, the reference, the control step."""
         plant = self.plant
@@ -109,9 +123,18 @@ class Stepper:
 
 
 def load_controller(scenario: Scenario) -> _core.Controller:
-    """The controller artefact that a scenario names."""
+    """The controller artefact that a scenario names; refused with the remedy if it is sampled at another rate."""
     path = find(scenario.controller.file, "controllers", ".json", "controller.file")
     try:
-        return _core.Controller(path.read_text(encoding="utf-8"))
+        controller = _core.Controller(path.read_text(encoding="utf-8"))
     except (_core.ArtifactError, UnicodeDecodeError) as error:
         raise _core.ArtifactError(f"{path.name}: {error}") from None
+    rate, made = scenario.controller.rate_hz, 1.0 / controller.sample_time
+    if abs(controller.sample_time - scenario.period) > 1e-9:
+        out = f"mu-{rate:g}.json"
+        raise _core.ConfigError(
+            f"controller.rate_hz: expected {made:g} ({path.name} is sampled at {1e3 * controller.sample_time:.4g} ms), "
+            f"found {rate:g}; make one: fingergait synthesize contact --rate {rate:g} --out {out}, "
+            f"then --controller {out}"
+        )
+    return controller

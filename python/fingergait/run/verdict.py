@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from fingergait._core import Diagnostics
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors, yaw_reached
+from fingergait.run.regrasping import LEFT, PHASES
 from fingergait.scenario import Scenario
 
 POSITION_REACHED = 0.010  # m
@@ -67,6 +68,10 @@ _CAUSES = {
     "torque_box": _Cause(
         "joints need more torque for their own weight and motion than they have", "check the torque limits"
     ),
+    "aground": _Cause(
+        "the object was set down and could not be taken again, or no support was found below it (aground)",
+        "see that the fingers reach all round it where it lies, and that it is lifted off a level support",
+    ),
     "overdue": _Cause(f"no finger could be freed (overdue): without it {_LOAD}", _LIGHTEN),
     "saturated": _Cause(f"torques were at their limit, or the wrench undeliverable (saturated): {_LOAD}", _LIGHTEN),
     "solver": _Cause("no solver certified contact forces", "report this with the log"),
@@ -77,26 +82,29 @@ def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
     """The figures of `run --json` that say whether the task was done.
 
     `completed`: not dropped or let go; at the end it is within 10 mm and 0.1 rad of the reference, and turned by
-    what was asked to 0.1 rad. `asked_rotation_rad`: net turn of the reference up to the end, the integral of its rate
+    what was asked to 0.1 rad. Of an object that is set down and taken again while the reference turns, the turn is asked
+    while it is held: less what it missed while it lay, and not where it was left lying. `asked_rotation_rad`: net turn of the reference up to the end, the integral of its rate
     with its step. `turned_rad`: that of the object, about the same axis. `worst_safe_mode`, `safe_mode_fraction`,
     `faults`: names, and share of the control steps after t = 0. `goals_reached`: None, as the reference has no goals.
     `link_contacts`: control steps in which a part of a finger other than its tip touched the object.
     `incomplete_reason`: words, None where completed.
     """
     t = log.t
-    errors = pose_errors(log.pose("object")[-1:], log.pose("desired")[-1:])[0]
-    asked = float(yaw_reached(log.pose("desired"))[-1])
+    goal = _goal(log)
+    errors = pose_errors(log.pose("object")[-1:], goal[-1:])[0]
+    asked, due = float(yaw_reached(log.pose("desired"))[-1]), float(yaw_reached(goal)[-1])
     turned = float(yaw_reached(log.pose("object"))[-1])
     position, angle = float(np.linalg.norm(errors[:3])), float(np.linalg.norm(errors[3:]))
     # Errors of orientation are those of less than half a turn; the turn itself counts whole ones.
-    reached = position <= POSITION_REACHED and angle <= ANGLE_REACHED and abs(turned - asked) <= ANGLE_REACHED
+    reached = position <= POSITION_REACHED and angle <= ANGLE_REACHED and abs(turned - due) <= ANGLE_REACHED
     modes = log["safe_mode"][t >= 0.0] if t[-1] >= 0.0 else log["safe_mode"]
     seen = np.bitwise_or.reduce(log["faults"].astype(np.int64))
     # Whoever holds nothing has not done anything, wherever the object happens to be.
-    completed = reached and not dropped and MODES[int(log["safe_mode"][-1])] != "stop"
+    left = PHASES[int(log["regrasp"][-1])] in LEFT
+    completed = reached and not dropped and not left and MODES[int(log["safe_mode"][-1])] != "stop"
     return {
         "completed": completed,
-        "incomplete_reason": None if completed else explain(log, scenario, position, asked, turned, angle),
+        "incomplete_reason": None if completed else explain(log, scenario, position, due, turned, angle),
         "asked_rotation_rad": asked,
         "turned_rad": turned,
         "worst_safe_mode": MODES[int(log["safe_mode"].max())],
@@ -105,6 +113,13 @@ def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
         "goals_reached": None,
         "link_contacts": int(log["link_contact"].sum()),
     }
+
+
+def _goal(log: Log) -> NDArray[np.float64]:
+    """Pose (T, 7) that the object is to have at each moment: what is asked, less what it may still miss."""
+    desired = log.pose("desired")
+    turns = len(desired) > 1 and abs(float(np.diff(yaw_reached(desired[-2:]))[-1])) > 1e-6
+    return np.where(log["regrasp"][:, None] > 0.0, log.block("governed"), desired) if turns else desired
 
 
 def explain(log: Log, scenario: Scenario, position: float, asked: float, turned: float, angle: float) -> str:

@@ -17,6 +17,7 @@ def core_config(scenario: Scenario) -> str:
         "rate_hz": scenario.controller.rate_hz,
         "mass": scenario.object.mass,
         "gait": scenario.gait,
+        "regrasp": scenario.regrasp,
         "force": {"friction": scenario.controller.friction, **scenario.force},
         "robust": scenario.robust,
         "torque": scenario.torque,

@@ -1,7 +1,7 @@
 """A scenario: plant, reference, disturbances and the errors of the model, read from TOML and checked.
 
-The tables `gait`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
-on as they are, and the core refuses what it doesn't know.
+The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they
+are passed on as they are, and the core refuses what it doesn't know.
 """
 
 import json
@@ -34,10 +34,18 @@ class HandConfig(Table):
 
 
 class SupportConfig(Table):
-    """A table below the object: height of its top, m (absent: none), and where its middle is, m."""
+    """A table below the object: height of its top, m (absent: none), and where its middle is, m.
+
+    tilt_deg
+        Its tilt, a rotation vector about x and y through the middle of its top, degrees.
+    softness
+        How many times softer than the fingertips its contact is, at the same share of critical damping.
+    """
 
     height: float | None = None
     position: tuple[float, float] = (0.0, 0.0)
+    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    softness: Positive = 1.0
 
 
 class ObjectConfig(Table):
@@ -199,6 +207,7 @@ class Scenario(Table):
     fault: tuple[Fault, ...] = ()
     input: tuple[Input, ...] = ()
     gait: dict[str, Any] = {}
+    regrasp: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
     robust: dict[str, Any] = {}

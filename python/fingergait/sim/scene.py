@@ -184,11 +184,21 @@ def _add_object(spec: mujoco.MjSpec, scenario: Scenario, hand: Hand) -> None:
     mark.rgba, mark.mass = np.array([0.97, 0.97, 0.97, 1.0]), 0.0
     if scenario.support.height is not None:
         # In a body of its own, behind all others: the ids of the hand's parts stay what they are.
-        stand = spec.worldbody.add_body(name=SUPPORT, pos=[*scenario.support.position, scenario.support.height - 0.01])
-        table = stand.add_geom(name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.15, 0.15, 0.01])
+        stand = spec.worldbody.add_body(name=SUPPORT, pos=[*scenario.support.position, scenario.support.height])
+        tilt = np.deg2rad([*scenario.support.tilt_deg, 0.0])
+        angle = float(np.linalg.norm(tilt))
+        if angle > 0.0:
+            mujoco.mju_axisAngle2Quat(stand.quat, tilt / angle, angle)
+        table = stand.add_geom(
+            name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.15, 0.15, 0.01], pos=[0.0, 0.0, -0.01]
+        )
         table.contype, table.conaffinity = types, types
         table.friction, table.condim = [1.0, _TORSION, _ROLLING], geom.condim
         table.solref, table.solimp = geom.solref, geom.solimp
+        if scenario.support.softness != 1.0:
+            # The time constant of a contact goes with the root of its softness; the table's own is taken.
+            table.solref = geom.solref * np.array([scenario.support.softness**0.5, 1.0])
+            table.priority, table.friction = 2, geom.friction
         table.rgba = np.array([0.75, 0.75, 0.72, 1.0])
 
 

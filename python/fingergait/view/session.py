@@ -95,7 +95,9 @@ class Session:
         self.steps += 1
         if self.steps % _CHECK_EVERY == 0 and self.lost is None and not stepper.refused:
             plant, standing = stepper.plant, diagnostics.safe_mode != "normal"
-            if self._monitor.update(t, plant.object_pose, stepper.pose, plant.sensors.normal_force, standing):
+            if self._monitor.update(
+                t, plant.object_pose, stepper.goal, plant.sensors.normal_force, standing, stepper.lying
+            ):
                 self.lost = self._monitor.symptom
         self.step_ns.append(diagnostics.step_ns)
         if len(self.step_ns) > 20_000:

@@ -21,6 +21,8 @@ impl DualStagePlanner {
         self.assume_friction();
         self.planner.reset();
         self.velocity_force.reset(0.0);
+        self.robust.forget();
+        self.regrasp.reset();
         self.posture.reset();
         self.limiter.reset();
         self.command.tau.fill(0.0);
@@ -61,11 +63,11 @@ impl DualStagePlanner {
             let F_des = self.robust.wrench(reference, &measurement.X_WO);
             if F_des.iter().all(|F| F.abs() < 1e6) {
                 self.steady.take(&F_des);
-                return F_des;
+                return F_des * self.regrasp.share();
             }
             self.robust.reset();
         }
-        *self.steady.wrench()
+        self.steady.wrench() * self.regrasp.share()
     }
 
     /// Lets go of fingers of which neither angles nor contact are known.

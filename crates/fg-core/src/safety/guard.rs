@@ -44,6 +44,8 @@ pub struct Plan<'a> {
     pub qd_des: Option<&'a [f64]>,
     /// The free finger looks for the surface.
     pub pressing: bool,
+    /// Desired joint velocities, rad/s, while the object lies and all fingers are off it, or may be.
+    pub open: Option<&'a [f64]>,
     /// There has been a first grasp.
     pub grasped: bool,
     /// Torques that the fingers needed for their own weight and motion, N m.
@@ -52,9 +54,16 @@ pub struct Plan<'a> {
     pub J: &'a DMatrix<f64>,
 }
 
+impl Plan<'_> {
+    /// True where finger `j` is off the object on purpose.
+    fn frees(&self, j: usize) -> bool {
+        self.open.is_some() || self.free == Some(j)
+    }
+}
+
 /// How the control step went.
 #[derive(Debug, Clone, Copy, Default)]
-#[allow(clippy::struct_excessive_bools)] // four facts that do not depend on each other
+#[allow(clippy::struct_excessive_bools)] // five facts that do not depend on each other
 pub struct Outcome {
     /// The contact forces are certified.
     pub solved: bool,
@@ -64,6 +73,8 @@ pub struct Outcome {
     pub saturated: bool,
     /// The grasp has grown bad, and no finger can be freed.
     pub overdue: bool,
+    /// The object was set down for good, or cannot be.
+    pub aground: bool,
 }
 
 /// Conditions of the whole step that must last before they count.
@@ -74,6 +85,7 @@ struct Conditions {
     solver: Debounce,
     saturated: Debounce,
     overdue: Debounce,
+    aground: Debounce,
     gone: Debounce,
     seeking: Debounce,
 }
@@ -299,14 +311,18 @@ impl Guard {
         self.faults.insert_if(saturated, Fault::Saturated);
         let overdue = self.conditions.overdue.update(outcome.overdue, dt, 0.0, c.recovery_time);
         self.faults.insert_if(overdue, Fault::Overdue);
+        let aground = self.conditions.aground.update(outcome.aground, dt, 0.0, c.recovery_time);
+        self.faults.insert_if(aground, Fault::Aground);
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
         let (tactile, motors) = (&self.trusted.tactile, &self.motors);
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let touching = tactile[j].f_n > 0.0;
-            joints::Use { touching, holding: !free && motors.drives(j), qd_des: plan.qd_des.filter(|_| free) }
+            let swinging = plan.open.map(|qd_des| &qd_des[state.joints(j)]);
+            let qd_des = swinging.or(plan.qd_des.filter(|_| free));
+            joints::Use { touching, holding: !free && motors.drives(j), qd_des }
         };
         let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
         let trusted = self.trusted.q.as_mut_slice();
@@ -331,15 +347,21 @@ impl Guard {
     ) {
         let motors = &self.motors;
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let drives = motors.drives(j);
-            touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            touch::Use {
+                drives,
+                open: plan.open.is_some(),
+                holding: !free,
+                pressing: free && plan.pressing,
+                f_n: plan.f[3 * j + 2],
+            }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
         self.touch.admit(tactile, elapsed, at, using, trusted, &mut self.faults);
         let efforts = Efforts { tau: measurement.tau.as_slice(), own: plan.own, J: plan.J };
-        let holds = |j: usize| plan.free != Some(j) && motors.drives(j) && self.joints.trusts(j);
+        let holds = |j: usize| !plan.frees(j) && motors.drives(j) && self.joints.trusts(j);
         self.effort.admit(tactile, &efforts, |j| hand.joints(j), holds);
         self.faults.insert_if(self.effort.failed(), Fault::TactileScale);
     }
@@ -353,7 +375,7 @@ impl Guard {
         state: &HandState,
     ) {
         let (joints, motors) = (&self.joints, &self.motors);
-        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j) && motors.drives(j);
+        let sticks = |j: usize| !plan.frees(j) && joints.trusts(j) && motors.drives(j);
         let motion = self.odometry.motion(hand, state, &self.trusted.tactile, sticks);
         let centre = self.odometry.centre(state);
         let X_WO = &measurement.X_WO;
@@ -382,7 +404,7 @@ impl Guard {
         let fingers = self.trusted.tactile.len();
         let touching = self.trusted.tactile.iter().filter(|reading| reading.f_n > 0.0).count();
         let enough = if conditions.gone.confirmed() { 2 } else { 1 };
-        let gone = plan.grasped && touching < enough;
+        let gone = plan.grasped && plan.open.is_none() && touching < enough;
         let gone = conditions.gone.update(gone, dt, c.contacts_timeout, c.recovery_time);
         self.faults.insert_if(gone, Fault::ContactsLost);
         let seeks = |j: usize| plan.pressing && self.trusted.tactile[j].f_n <= 0.0 && self.motors.drives(j);
@@ -398,7 +420,11 @@ impl Guard {
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let strained = conditions.saturated.confirmed() || conditions.overdue.confirmed();
-        let mut mode = if slow || strained { SafeMode::Hold } else { SafeMode::Normal };
+        let mut mode = if slow || strained || conditions.aground.confirmed() {
+            SafeMode::Hold
+        } else {
+            SafeMode::Normal
+        };
         if self.blind || self.pose.failed() {
             mode = SafeMode::Squeeze;
         }

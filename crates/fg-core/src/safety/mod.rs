@@ -85,11 +85,13 @@ pub enum Fault {
     TactileScale = 20,
     /// The normals of the first contacts point away from each other: axes are swapped, or a sign is wrong.
     TactileAxes = 21,
+    /// The object cannot be taken again, or not be set down: it lies and is left alone, or is held where it is.
+    Aground = 22,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -112,6 +114,7 @@ impl Fault {
         Self::PoseFrame,
         Self::TactileScale,
         Self::TactileAxes,
+        Self::Aground,
     ];
 
     /// The name used in logs.
@@ -139,6 +142,7 @@ impl Fault {
             Self::PoseFrame => "pose_frame",
             Self::TactileScale => "tactile_scale",
             Self::TactileAxes => "tactile_axes",
+            Self::Aground => "aground",
         }
     }
 }

@@ -14,9 +14,12 @@ const PRESSES: f64 = 0.4;
 
 /// What the last step knew about one finger.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub struct Use {
     /// False where the finger's motors give no torque: it lies where it lies.
     pub drives: bool,
+    /// True where all fingers are off the object on purpose, or about to be: none of them need feel anything.
+    pub open: bool,
     /// True where the force optimiser gives the finger its force.
     pub holding: bool,
     /// True where the finger looks for the surface.
@@ -196,7 +199,7 @@ impl Tip {
         c: &SafetyConfig,
         elapsed: f64,
     ) -> bool {
-        if reading.f_n > threshold || !using.drives {
+        if reading.f_n > threshold || !using.drives || using.open {
             self.gone = false;
             self.pressing = None;
             return false;
