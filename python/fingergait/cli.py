@@ -197,6 +197,42 @@ def synthesize(
     run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json)
 
 
+@app.command(epilog=example("fingergait adopt my-hand.xml --facts my-hand.facts.toml --out my-hand"))
+def adopt(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="An MJCF or URDF file, or a packaged hand's name.",
+            autocompletion=names_of("hands"),
+        ),
+    ],
+    facts: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Facts of the hand.")] = None,
+    objects: Annotated[
+        list[str] | None, typer.Option("--objects", metavar="FAMILY", help="cylinder, ball or box; all by default.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(help="Of the objects, kg; by default what the hand should carry.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The bundle; runs/adopt-<model> by default.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer objects and runs, no synthesis.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; all cores by default.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Adopt a hand: grasps, controller, scenarios and a report of what it does; stages that stand are not repeated."""
+    from fingergait.adopt import Adoption
+    from fingergait.adopt.command import show_adoption
+    from fingergait.adopt.family import FAMILIES
+
+    chosen = tuple(objects or FAMILIES)
+    values = Adoption(model, facts, out, objects=chosen, mass=mass, quick=quick, workers=workers).report
+    if as_json:
+        print_json(values)
+    else:
+        show_adoption(values, Console())
+    raise typer.Exit(DONE if values["turns"] else MISSED)
+
+
 @app.command(epilog=example("fingergait grasps my-hand.xml --facts my-hand.facts.toml --object ball"))
 def grasps(
     hand: Annotated[

@@ -38,6 +38,27 @@ def run_grasps(
     return values
 
 
+def show_adoption(values: dict[str, Any], console: Console) -> None:
+    """Prints what the runs did, a row a scenario, and why the hand does not turn its object where it doesn't."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("scenario", "object", "held", "asked", "forwards", "backwards", "fails first"):
+        table.add_column(name)
+    for entry in values["verified"]:
+        turned = ["-" if (x := entry[f"turned_{way}_rad"]) is None else f"{np.rad2deg(x):.0f}°" for way in _WAYS]
+        asked, held = f"{np.rad2deg(entry['asked_rad']):.0f}°", f"{entry['completed']} of {entry['runs']}"
+        table.add_row(entry["file"], entry["object"], held, asked, *turned, entry["fails_first"])
+    console.print(table)
+    if values["controller"]:
+        peak = values["mu_peak"]
+        console.print(f"controller: mu {'none, unstable' if peak is None else f'{peak:.2f}'}", highlight=False)
+    verdict = "turns its object, both ways" if values["turns"] else f"does not turn without end: {values['reason']}"
+    console.print(f"{values['hand']} {verdict}", highlight=False, markup=False)
+    console.print(f"bundle: {values['bundle']}; report: {values['report']}", highlight=False, markup=False)
+
+
+_WAYS = ("forwards", "backwards")
+
+
 def show(search: GraspSearch | dict[str, Any], console: Console) -> None:
     """Prints a row an object: its best grasp's stroke and loads, or what forbids it."""
     values = search.as_json() if isinstance(search, GraspSearch) else search

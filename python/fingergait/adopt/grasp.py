@@ -77,11 +77,24 @@ class Grasp:
             "grasp": {"joints": [angle for finger in self.joints for angle in finger]},
         }
 
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> "Grasp":
+        """The grasp that `as_json` has made plain values of."""
+        spec = ObjectSpec(values["object"]["family"], tuple(values["object"]["size"]), values["object"]["mass"])
+        arrays = {key: np.array(values[key]) for key in ("places", "normals", "reach")}
+        spared = tuple(np.inf if x is None else x for x in values["spared"])
+        joints, ended = (tuple(map(tuple, values[key])) for key in ("joints", "ended"))
+        tuples = {"pose": tuple(values["pose"]), "slack": tuple(values["slack"])}
+        load = np.inf if values["load"] is None else values["load"]
+        given = {"object": spec, "spared": spared, "joints": joints, "ended": ended, "load": load, **arrays, **tuples}
+        return cls(**(values | given))
+
     def as_json(self) -> dict[str, Any]:
         """Plain values for a JSON file; infinite loads are null."""
         values = asdict(self)
         for key in ("places", "normals", "reach"):
             values[key] = np.asarray(values[key]).tolist()
+        values["load"] = self.load if np.isfinite(self.load) else None
         values["spared"] = [x if np.isfinite(x) else None for x in self.spared]
         return values
 

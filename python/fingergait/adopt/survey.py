@@ -1,23 +1,21 @@
 """The grasp search for many objects, in parallel processes: nominal grasps, and the map of what is possible."""
 
-import multiprocessing
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from fingergait.adopt.family import FAMILIES, ObjectSpec
 from fingergait.adopt.grasp import Found, Grasp
-from fingergait.adopt.library import Library, draw_library
+from fingergait.adopt.library import draw_library
 from fingergait.adopt.options import SearchOptions
+from fingergait.adopt.progress import bar
 from fingergait.adopt.search import search_object
 from fingergait.adopt.view import HandView
+from fingergait.stopping import in_processes
 
 Array = NDArray[np.float64]
 
@@ -140,10 +138,13 @@ def search_grasps(
     along = None if axis is None else np.asarray(axis, dtype=np.float64)
     workers = min(workers or os.cpu_count() or 1, max(1, len(objects)))
     results: dict[int, Found] = {}
-    with _bar(len(objects), progress) as advance:
-        for index, found in _results(hand, objects, options, along, workers):
-            results[index] = found
-            advance(found)
+    with bar("grasps", len(objects), progress) as advance:
+        rows = _rows(objects)
+        calls = [(_row, ([objects[index] for index in row], hand, options, along)) for row in rows]
+        for number, row in in_processes(calls, min(workers, max(1, len(rows)))):
+            for index, found in zip(rows[number], row, strict=True):
+                results[index] = found
+                advance(f"{found.object}: {found.kind}")
     up = hand.up if along is None else along / np.linalg.norm(along)
     return GraspSearch(
         hand=hand.name,
@@ -154,54 +155,16 @@ def search_grasps(
     )
 
 
-_Shared = tuple[HandView, SearchOptions, Array | None, Library]
-_shared: _Shared | None = None
-
-
-def _share(hand: HandView, options: SearchOptions, axis: Array | None) -> None:
-    global _shared
-    _shared = (hand, options, axis, draw_library(hand, options.samples, options.seed))
-
-
-def _search_row(row: list[ObjectSpec]) -> list[Found]:
-    assert _shared is not None
-    return list(_row(row, _shared))
-
-
-def _row(row: list[ObjectSpec], shared: _Shared) -> Iterator[Found]:
+def _row(row: list[ObjectSpec], hand: HandView, options: SearchOptions, axis: Array | None) -> list[Found]:
     """A family's objects from the middle outwards: each search begins at its neighbour's grasp; in the row's order."""
-    hand, options, axis, library = shared
+    library = draw_library(hand, options.samples, options.seed)
     middle = len(row) // 2
     found: dict[int, Found] = {}
     for index in [middle, *range(middle + 1, len(row)), *range(middle - 1, -1, -1)]:
         neighbour = found.get(index - 1 if index > middle else index + 1)
         near = neighbour.best if neighbour is not None and neighbour.kind == "gait" else None
         found[index] = search_object(hand, row[index], options, axis, library, near)
-    yield from (found[index] for index in range(len(row)))
-
-
-def _results(
-    hand: HandView, objects: Sequence[ObjectSpec], options: SearchOptions, axis: Array | None, workers: int
-) -> Iterator[tuple[int, Found]]:
-    rows = _rows(objects)
-    work = [[objects[index] for index in row] for row in rows]
-    if workers == 1:
-        shared = (hand, options, axis, draw_library(hand, options.samples, options.seed))
-        for row, own in zip(rows, work, strict=True):
-            yield from zip(row, _row(own, shared), strict=True)
-        return
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, context, _share, (hand, options, axis)) as pool:
-        pending = {pool.submit(_search_row, own): row for row, own in zip(rows, work, strict=True)}
-        try:
-            for future in as_completed(pending):
-                yield from zip(pending[future], future.result(), strict=True)
-        except BaseException:
-            for future in pending:
-                future.cancel()
-            raise
+    return [found[index] for index in range(len(row))]
 
 
 def _rows(objects: Sequence[ObjectSpec]) -> list[list[int]]:
@@ -213,26 +176,3 @@ def _rows(objects: Sequence[ObjectSpec]) -> list[list[int]]:
 
 
 _ROW = 4
-
-
-class _bar:
-    """A progress bar on standard error; calling it counts one object more."""
-
-    def __init__(self, total: int, shown: bool) -> None:
-        columns = (
-            TextColumn("grasps"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[state]}"),
-            TimeElapsedColumn(),
-        )
-        console = Console(stderr=True)
-        self._progress = Progress(*columns, console=console, transient=True, disable=not shown)
-        self._task = self._progress.add_task("", total=total, state="")
-
-    def __enter__(self) -> Callable[[Found], None]:
-        self._progress.start()
-        return lambda found: self._progress.update(self._task, advance=1, state=f"{found.object}: {found.kind}")
-
-    def __exit__(self, *error: object) -> None:
-        self._progress.stop()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
-from fingergait.hand import Finger, Hand
+from fingergait.hand import Finger, Hand, geom_name
 
 Array = NDArray[np.float64]
 
@@ -125,8 +125,8 @@ class HandView:
         return qpos
 
     def geom_name(self, geom: int) -> str:
-        """The geom's name, or its body's, for people."""
-        return str(self.model.geom(geom).name or self.model.body(int(self.model.geom_bodyid[geom])).name)
+        """The geom's name, or what it is and of which body, for people."""
+        return geom_name(self.model, geom)
 
 
 def with_probes(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, dict[str, int]]:
