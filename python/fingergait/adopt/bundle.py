@@ -25,6 +25,7 @@ def write_hand(model: Path, facts: Path | None, out: Path) -> list[str]:
     spec = load_spec(model)
     files = _copy_assets(spec, model, out)
     spec.meshdir = spec.texturedir = ASSETS if files else ""
+    spec.modelfiledir = str(out.resolve())
     try:
         spec.compile()
         text = spec.to_xml()

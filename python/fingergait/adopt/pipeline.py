@@ -5,6 +5,7 @@ Each stage writes its part of the bundle and is not repeated while its inputs st
 
 import json
 import os
+import tempfile
 import time
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from fingergait.adopt.bundle import HAND, write_hand, write_scenario
+from fingergait.adopt.choose import LENGTH, candidates, ordered, try_turn
 from fingergait.adopt.contact import identified
-from fingergait.adopt.control import Base, artefact_of, design, fit
+from fingergait.adopt.control import Base, Fitted, artefact_of, design, fit
 from fingergait.adopt.family import FAMILIES, ObjectSpec
 from fingergait.adopt.grasp import Grasp
 from fingergait.adopt.options import SearchOptions
@@ -37,6 +39,7 @@ from fingergait.synthesis.contact_plant import ReflectedHand
 
 CONTROLLER, MAP, GRASPS, REPORT, FILM = "controller.json", "map.png", "grasps.json", "report.json", "turn.png"
 _SIZES, _QUICK_SIZES = 6, 4  # objects of each family that the search looks at
+_TRIED, _QUICK_TRIED = 8, 4  # objects that are turned to choose among them
 _SEEDS, _QUICK_SEEDS = 3, 1  # runs each way, besides the one without errors
 _GAIT_S = 0.7  # s that a gait takes: unloading, sliding and loading
 _FASTEST = 0.2  # rad/s
@@ -128,30 +131,53 @@ class Adoption:
         return values
 
     @cached_property
-    def chosen(self) -> list[Grasp]:
-        """The grasps to go on with, the nominal one first: of each family the one with the longest stroke.
+    def tried(self) -> list[dict[str, Any]]:
+        """Stage 3: short turns from the most promising grasps, each with a K fitted by the model; the best one first.
 
-        Those that turn in the air go before those that hold only. Without `quick`, the smallest and the largest object
-        of the nominal one's family follow.
+        `grasp`, and `rows` of its runs both ways, see `verify.run_trial`.
         """
-        best = [Grasp.from_json(entry["grasps"][0]) for entry in self.grasps["objects"] if entry["grasps"]]
-        if any(grasp.kind == "gait" for grasp in best):
-            best = [grasp for grasp in best if grasp.kind == "gait"]
-        best.sort(key=lambda grasp: (-round(grasp.stroke, 3), max(grasp.spared), grasp.object.size))
+        most = _QUICK_TRIED if self.quick else _TRIED
+        grasps = [grasp.as_json() for grasp in candidates(self.grasps, most)]
+        return list(self.stages.get("choice", [self._hand_digest, grasps], lambda: self._try(grasps)))
+
+    def _try(self, grasps: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        base, own = Base.load(), [Grasp.from_json(values) for values in grasps]
+        with tempfile.TemporaryDirectory() as name, bar("choice", 2 * len(own), self.progress) as advance:
+            folder, calls = Path(name), []
+            for number, grasp in enumerate(own):
+                fitted, nominal = self._fitted(base, grasp), nominal_of(grasp.object)
+                artefact_of(base, nominal, fitted.spec, fitted.axes, {}).write(folder / f"{number}.json")
+                turn = {**self._turn(grasp), "duration": LENGTH}
+                values = {**self._start(grasp), **turn, "controller": {"file": f"{number}.json"}}
+                write_scenario(folder / f"{number}.toml", values)
+                calls += [(try_turn, (folder, f"{number}.toml", sense)) for sense in (1, -1)]
+            rows: dict[int, dict[str, Any]] = {}
+            for number, row in in_processes(calls, min(self.workers, max(1, len(calls)))):
+                rows[number] = row
+                advance(str(own[number // 2].object))
+        pairs = [[rows[2 * i], rows[2 * i + 1]] for i in range(len(own))]
+        return [{"grasp": grasps[i], "rows": pairs[i]} for i in ordered(own, pairs)]
+
+    def _fitted(self, base: Base, grasp: Grasp) -> Fitted:
+        """The packaged K fitted to a grasp by the model alone."""
+        hand, spec = reflected(self.view, grasp), grasp.object
+        return fit(base, nominal_of(spec), spec.radius, hand, self.hand["lag"])
+
+    @cached_property
+    def chosen(self) -> list[Grasp]:
+        """The grasps to go on with: the one that turned best is the nominal one; then the best of each other family.
+
+        With `quick` the nominal one only.
+        """
         chosen: dict[str, Grasp] = {}
-        for grasp in best:
+        for entry in self.tried:
+            grasp = Grasp.from_json(entry["grasp"])
             chosen.setdefault(grasp.object.family, grasp)
-        picked = list(chosen.values())[: 1 if self.quick else None]
-        if picked and not self.quick:
-            family = sorted(
-                (g for g in best if g.object.family == picked[0].object.family), key=lambda g: g.object.radius
-            )
-            picked += [g for g in (family[0], family[-1]) if all(g is not other for other in picked)]
-        return picked
+        return list(chosen.values())[: 1 if self.quick else None]
 
     @cached_property
     def controller(self) -> dict[str, Any]:
-        """Stage 3: K for the nominal object in this hand; empty where there is no grasp. See `control.design`."""
+        """Stage 4: K for the nominal object in this hand; empty where there is no grasp. See `control.design`."""
         if not self.chosen:
             return {}
         nominal = self.chosen[0].as_json()
@@ -163,8 +189,7 @@ class Adoption:
         nominal = nominal_of(spec)
         weight = spec.mass * float(np.linalg.norm(self.view.gravity))
         with bar("controller", 3, self.progress) as advance:
-            model = reflected(self.view, grasp)
-            first = fit(base, nominal, radius, model, lag)
+            model, first = reflected(self.view, grasp), self._fitted(base, grasp)
             trial = {**self._start(grasp), "controller": {"file": str((self.out / CONTROLLER).resolve())}}
             artefact_of(base, nominal, first.spec, first.axes, {}).write(self.out / CONTROLLER)
             advance("pulses in contact")
@@ -185,7 +210,7 @@ class Adoption:
 
     @cached_property
     def scenarios(self) -> list[dict[str, Any]]:
-        """Stage 4: the scenarios written; `file`, `task` and `object` of each."""
+        """Stage 5: the scenarios written; `file`, `task` and `object` of each."""
         if not self.chosen:
             return []
         inputs = [self._hand_digest, self.controller, [grasp.as_json() for grasp in self.chosen]]
@@ -232,7 +257,7 @@ class Adoption:
 
     @cached_property
     def verified(self) -> list[dict[str, Any]]:
-        """Stage 5: figures of the runs of each scenario, see `verify.summary`; `rows` has every run."""
+        """Stage 6: figures of the runs of each scenario, see `verify.summary`; `rows` has every run."""
         if not self.scenarios:
             return []
         files = [HAND, *self.hand["files"], CONTROLLER, *(entry["file"] for entry in self.scenarios)]
