@@ -20,7 +20,7 @@ FLOORS = [
     ["sim"],
     ["run"],
     ["synthesis", "view"],
-    ["campaign", "reproduce", "bench"],
+    ["campaign", "reproduce", "bench", "adopt"],
     ["check", "catalogue"],
     ["_former_names"],
     ["cli"],

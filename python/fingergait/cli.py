@@ -243,6 +243,76 @@ def synthesize(
     run_synthesize(find(spec, "specs", ".toml", "SPEC"), out, as_json, rate=rate)
 
 
+@app.command(epilog=example("fingergait adopt my-hand.xml --facts my-hand.facts.toml --out my-hand"))
+def adopt(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="An MJCF or URDF file, or a packaged hand's name.",
+            autocompletion=names_of("hands"),
+        ),
+    ],
+    facts: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Facts of the hand.")] = None,
+    objects: Annotated[
+        list[str] | None, typer.Option("--objects", metavar="FAMILY", help="cylinder, ball or box; all by default.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(help="Of the objects, kg; by default what the hand should carry.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The bundle; runs/adopt-<model> by default.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer objects and runs, no synthesis.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; all cores by default.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Adopt a hand: grasps, controller, scenarios and a report of what it does; stages that stand are not repeated."""
+    from fingergait.adopt import Adoption
+    from fingergait.adopt.command import show_adoption
+    from fingergait.adopt.family import FAMILIES
+
+    chosen = tuple(objects or FAMILIES)
+    values = Adoption(model, facts, out, objects=chosen, mass=mass, quick=quick, workers=workers).report
+    if as_json:
+        print_json(values)
+    else:
+        show_adoption(values, Console())
+    raise typer.Exit(DONE if values["turns"] else MISSED)
+
+
+@app.command(epilog=example("fingergait grasps my-hand.xml --facts my-hand.facts.toml --object ball"))
+def grasps(
+    hand: Annotated[
+        str,
+        typer.Argument(
+            metavar="HAND.xml",
+            help="A packaged hand's name, or an MJCF or URDF file.",
+            autocompletion=names_of("hands"),
+        ),
+    ] = "hand",
+    facts: Annotated[Path | None, typer.Option(metavar="FILE.toml", help="Facts of the hand.")] = None,
+    family: Annotated[
+        list[str] | None, typer.Option("--object", metavar="FAMILY", help="cylinder, ball or box; all by default.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(help="Of the objects, kg; by default what the hand should carry.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where grasps.json and map.png go.")] = Path("runs/grasps"),
+    quick: Annotated[bool, typer.Option("--quick", help="Less effort: shorter strokes may be found.")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; all cores by default.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Search the grasps from which a hand can turn objects; say what forbids the others."""
+    from fingergait.adopt.command import run_grasps, show
+    from fingergait.adopt.family import FAMILIES
+
+    values = run_grasps(hand, facts, tuple(family or FAMILIES), mass, out, quick, workers)
+    if as_json:
+        print_json(values)
+    else:
+        show(values, Console())
+    raise typer.Exit(DONE if any(entry["kind"] == "gait" for entry in values["objects"]) else MISSED)
+
+
 @app.command(epilog=example("fingergait bench --quick"))
 def bench(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the rows and the plot go.")] = Path("runs/bench"),

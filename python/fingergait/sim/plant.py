@@ -171,10 +171,10 @@ def _lags(scene: SceneModel) -> Array:
 def _parts(scene: SceneModel) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """For each geom, whether it is the object's, and whether it is a part of a finger other than its tip."""
     model = scene.model
-    joints = {int(model.jnt_bodyid[joint]) for finger in scene.fingers for joint in finger.joints}
+    joints = {int(model.jnt_bodyid[joint]) for finger in scene.fingers for joint in finger.links}
     moves = np.zeros(model.nbody, dtype=bool)
     for body in range(1, model.nbody):  # parents come first
         moves[body] = body in joints or moves[model.body_parentid[body]]
     links = moves[model.geom_bodyid]
-    links[scene.tips] = False
+    links[[finger.tip for finger in scene.fingers]] = False
     return model.geom_bodyid == scene.object_body, links
