@@ -405,8 +405,8 @@ class ForceSolution:
         """Who found them: "active_set", "clarabel_polished", "clarabel" or "held"."""
     @property
     def kkt(self) -> float:
-        """Residual of the optimality (KKT) conditions, N; of held forces too, then never zero: their worst violation of a
-        bound or their distance from a minimiser, whichever is larger."""
+        """Residual of the optimality (KKT) conditions, N; of held forces too, then never zero: their worst violation
+        of a bound or their distance from a minimiser, whichever is larger."""
     @property
     def solve_ns(self) -> int:
         """Thread CPU time of the solve, ns."""

@@ -209,8 +209,8 @@ impl ForceSolution {
     fn solver(&self) -> &'static str {
         self.core.solver.as_str()
     }
-    /// Residual of the optimality (KKT) conditions, N; of held forces too, then never zero: their worst violation of a
-    /// bound or their distance from a minimiser, whichever is larger.
+    /// Residual of the optimality (KKT) conditions, N; of held forces too, then never zero: their worst violation
+    /// of a bound or their distance from a minimiser, whichever is larger.
     #[getter]
     fn kkt(&self) -> f64 {
         self.core.kkt

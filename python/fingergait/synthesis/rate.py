@@ -13,7 +13,7 @@ def at_rate(spec: SynthesisSpec, rate_hz: float) -> SynthesisSpec:
     """The spec for a controller that is sampled at `rate_hz`.
 
     The delay keeps its number of samples: it is the time from the sensors to the motors of a loop that computes once a
-    period, one sample in the packaged spec. A computer with another delay at that rate needs a spec of its own that says so.
+    period, one sample in the packaged spec. A computer with another delay at that rate needs a spec that says so.
 
     A slower rate has more dead time, lag + delay + half a sample of hold, by 1/k. The bandwidth that is asked for falls
     with k^2, the disturbance that is to be met and the effort for it with k. Without that the uncertain damping is no
