@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 
 _FOV = np.deg2rad(35.0)
 _AZIMUTH, _ELEVATION = np.deg2rad(-60.0), np.deg2rad(28.0)
+_TOWARDS = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
+_ASPECT = 0.8  # of the picture between the panels, about: narrower than high
+_MARGIN = 1.05
 _OPACITY = 0.5  # of the object: the forces on it are inside
 _GAMMA = 2.2  # MuJoCo's colours are meant for the screen, the page's meshes want them linear
 _AMBIENT = 0.4  # share of the light that comes from all around
@@ -48,13 +51,11 @@ class Drawing:
             "/object", mesh.vertices, mesh.faces, color=tuple(rgba[:3].tolist()), opacity=_OPACITY, side="double"
         )
         self._object = scene.object_body
-        self.centre, self.size = _frame(scene, start)
-        distance = 1.12 * self.size / np.sin(0.5 * _FOV)
-        direction = np.array(
-            [np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)]
-        )
+        points, radii = _spheres(scene, start)
+        lower, upper = (points - radii[:, None]).min(axis=0), (points + radii[:, None]).max(axis=0)
+        self.centre, self.size = 0.5 * (lower + upper), 0.5 * float(np.max(upper - lower))
         camera = server.initial_camera
-        camera.position = self.centre + distance * direction
+        camera.position = self.centre + _distance(points - self.centre, radii) * _TOWARDS
         camera.look_at = self.centre
         camera.fov = float(_FOV)
 
@@ -64,11 +65,17 @@ class Drawing:
         self._scene.update_from_mjdata(data)
 
 
-def _frame(scene: SceneModel, data: mujoco.MjData) -> tuple[Array, float]:
-    """Centre (3,), m, and radius, m, of the fingers and the object."""
+def _spheres(scene: SceneModel, data: mujoco.MjData) -> tuple[Array, Array]:
+    """Centres (n, 3) and radii (n,), m, of spheres around the parts of the fingers and the object."""
     model = scene.model
     bodies = {scene.object_body, *(int(model.jnt_bodyid[joint]) for f in scene.fingers for joint in f.links)}
     geoms = [g for g in range(model.ngeom) if int(model.body_weldid[model.geom_bodyid[g]]) in bodies]
-    points, radii = data.geom_xpos[geoms], model.geom_rbound[geoms]
-    lower, upper = (points - radii[:, None]).min(axis=0), (points + radii[:, None]).max(axis=0)
-    return 0.5 * (lower + upper), 0.5 * float(np.max(upper - lower))
+    return data.geom_xpos[geoms], model.geom_rbound[geoms]
+
+
+def _distance(points: Array, radii: Array) -> float:
+    """How far from the origin the camera has to be, m, so that the picture has all the spheres in it."""
+    right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
+    aside = np.abs(points @ np.column_stack([right, np.cross(_TOWARDS, right)])) + radii[:, None]
+    widest = (aside / [_ASPECT, 1.0]).max(axis=1)
+    return float(np.max(points @ _TOWARDS + _MARGIN * widest / np.tan(0.5 * _FOV)))
