@@ -34,7 +34,7 @@ def _is_field(owner: type, member: str) -> bool:
     return member in fields
 
 
-@pytest.mark.parametrize("name", [name for name, _ in public()])
+@pytest.mark.parametrize("name", sorted(name for name, _ in public()))
 def test_public_names_have_docstrings(name: str) -> None:
     value = dict(public())[name]
     text = inspect.getdoc(value) or ""

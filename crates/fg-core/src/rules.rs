@@ -13,6 +13,8 @@ use nalgebra::Vector3;
 const RADIUS: f64 = 0.025;
 /// Weight of the paper's object, N.
 const WEIGHT: f64 = 0.5 * 9.81;
+/// Ratio of two neighbouring scales.
+const STEP: f64 = 1.1;
 
 /// The size of a grasp and the weight that it carries, over the paper's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,14 +26,22 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// That of the present `grasp` under an object of `weight` newtons. Bounded to a tenth and ten times: a rule is no
-    /// excuse for a limit of nothing.
+    /// That of the present `grasp` under an object of `weight` newtons.
     pub fn of(grasp: &Grasp, weight: f64) -> Self {
         let n = grasp.contacts().len() as f64;
         let middle = grasp.contacts().iter().map(|contact| contact.p_WC).sum::<Vector3<f64>>() / n;
         let radius = grasp.contacts().iter().map(|contact| (contact.p_WC - middle).norm()).sum::<f64>() / n;
-        let bounded = |ratio: f64| if ratio.is_finite() { ratio.clamp(0.1, 10.0) } else { 1.0 };
-        Self { length: bounded(radius / RADIUS), force: bounded(weight / WEIGHT) }
+        Self { length: stepped(radius / RADIUS), force: stepped(weight / WEIGHT) }
+    }
+}
+
+/// `ratio` in steps of a tenth of itself, since no default is known any better, and a grasp that is felt with noise is to
+/// be driven as the same one without. Bounded to a tenth and ten times: a rule is no excuse for a limit of nothing.
+fn stepped(ratio: f64) -> f64 {
+    if ratio.is_finite() {
+        STEP.powf((ratio.clamp(0.1, 10.0).ln() / STEP.ln()).round())
+    } else {
+        1.0
     }
 }
 

@@ -28,6 +28,7 @@ CAUSES = {
     "pose_frame": "the measured pose is not where the fingers touch: it is in another frame",
     "tactile_scale": "the tactile forces contradict the joint torques",
     "tactile_axes": "the normals that the fingers feel point away from each other",
+    "aground": "the object was set down and can't be taken again, or nothing was found below it to set it down on",
 }
 """What each of the core's faults means, in the order of its bits."""
 _MODES = {
