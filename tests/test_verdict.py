@@ -17,7 +17,7 @@ from test_cli import call
 
 def made(scenario: Scenario, yaw: np.ndarray | None = None, off: float = 0.0) -> Log:
     """A log of 100 Hz in which the object follows its reference, but for its yaw, if given, and a shift at the end."""
-    log = Log(columns([f"f{j}" for j in range(4)], 3), [f"f{j}" for j in range(4)])
+    log = Log(columns([f"f{j}" for j in range(4)], [3] * 4), [f"f{j}" for j in range(4)])
     trajectory = Trajectory(scenario.reference, [0.0, 0.0, 0.06, 1.0, 0.0, 0.0, 0.0])
     times = np.arange(0.0, scenario.duration, 0.01)
     index = {name: k for k, name in enumerate(log.names)}
