@@ -35,9 +35,9 @@ def regrasp(quick: bool) -> Experiment:
         key="regrasp",
         title="Set down and take again",
         paper="beyond the paper, whose gait needs a finger that the others can do without",
-        text="A hand of three fingers over a table turns a cylinder and a cube of 65 mm at 2 rad/s while it holds them, "
-        "sets them down, takes them again and goes on. Only what the fingers feel tells that the object lies. A turn "
-        "counts in the air only, and so do the errors. Every run has noise on all sensors.",
+        text="A hand of three fingers over a table turns a cylinder and a cube of 65 mm at 2 rad/s while it holds "
+        "them, sets them down, takes them again and goes on. Only what the fingers feel tells that the object lies. "
+        "A turn counts in the air only, and so do the errors. Every run has noise on all sensors.",
         cases=tuple(cases),
         judge=lambda outcomes: _judge(list(outcomes.values()), duration),
     )
