@@ -83,11 +83,12 @@ def verdict(log: Log, scenario: Scenario, dropped: bool) -> dict[str, Any]:
 
     `completed`: not dropped or let go; at the end it is within 10 mm and 0.1 rad of the reference, and turned by
     what was asked to 0.1 rad. Of an object that is set down and taken again while the reference turns, the turn is
-    asked while it is held: less what it missed while it lay, and not where it was left lying. `asked_rotation_rad`:
-    net turn of the reference up to the end, the integral of its rate with its step. `turned_rad`: that of the
-    object, about the same axis. `worst_safe_mode`, `safe_mode_fraction`, `faults`: names, and share of the control
-    steps after t = 0. `goals_reached`: None, as the reference has no goals. `link_contacts`: control steps in which
-    a part of a finger other than its tip touched the object. `incomplete_reason`: words, None where completed.
+    asked while it is held, less what it missed while it lay; one that was left lying is not completed.
+    `asked_rotation_rad`: net turn of the reference up to the end, the integral of its rate with its step.
+    `turned_rad`: that of the object, about the same axis. `worst_safe_mode`, `safe_mode_fraction`, `faults`: names,
+    and share of the control steps after t = 0. `goals_reached`: None, as the reference has no goals. `link_contacts`:
+    control steps in which a part of a finger other than its tip touched the object.
+    `incomplete_reason`: words, None where completed.
     """
     t = log.t
     goal = _goal(log)
