@@ -306,6 +306,7 @@ class Adoption:
             "mu_peak": self.controller.get("mu_peak"),
             "controller": self.controller,
             "verified": [{k: v for k, v in entry.items() if k != "rows"} for entry in verified],
+            "tried": [_tried(entry) for entry in self.tried],
             "not_possible": [
                 {
                     "object": str(ObjectSpec(e["family"], tuple(e["size"]), e["mass"])),
@@ -356,6 +357,19 @@ def nominal_of(spec: ObjectSpec) -> Nominal:
     """The homogeneous body of an object: mass and principal moments."""
     first, second, third = (float(x) for x in spec.shape.inertia(spec.mass))
     return Nominal(spec.mass, (first, second, third))
+
+
+def _tried(entry: dict[str, Any]) -> dict[str, Any]:
+    """An object that was turned to choose among them, and what came of it, for the report."""
+    grasp, (forwards, backwards) = Grasp.from_json(entry["grasp"]), entry["rows"]
+    return {
+        "object": str(grasp.object),
+        "stroke_rad": grasp.stroke,
+        "asked_rad": forwards["asked_rad"],
+        "turned_forwards_rad": forwards["turned_rad"],
+        "turned_backwards_rad": -backwards["turned_rad"],
+        "fails": forwards["fails"] or backwards["fails"],
+    }
 
 
 def _text(values: Any) -> str:
