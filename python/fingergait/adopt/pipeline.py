@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import time
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -110,9 +111,9 @@ class Adoption:
 
     @cached_property
     def view(self) -> HandView:
-        """The bundle's hand as the search sees it."""
-        assert self.hand["files"]
-        return view_of(import_hand(self.out / HAND))
+        """The bundle's hand as the search sees it, under the model's name."""
+        name = self.hand["source"]  # which writes the hand, too
+        return replace(view_of(import_hand(self.out / HAND)), name=name)
 
     @cached_property
     def grasps(self) -> dict[str, Any]:

@@ -25,8 +25,8 @@ else:
 
 class HandConfig(Table):
     """The hand: an MJCF or URDF file, an adopted bundle's folder, or a packaged name; its facts file (absent:
-    `<stem>.facts.toml` beside it); pose of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where the
-    file's own does not serve."""
+    `<stem>.facts.toml` beside it); pose of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where
+    the file's own does not serve."""
 
     file: str = "hand"
     facts: str | None = None
