@@ -148,7 +148,8 @@ class Adoption:
             for number, grasp in enumerate(own):
                 fitted, nominal = self._fitted(base, grasp), nominal_of(grasp.object)
                 artefact_of(base, nominal, fitted.spec, fitted.axes, {}).write(folder / f"{number}.json")
-                turn = {**self._turn(grasp), "duration": LENGTH}
+                turn = self._turn(grasp)
+                turn["duration"] = min(LENGTH, turn["duration"])
                 values = {**self._start(grasp), **turn, "controller": {"file": f"{number}.json"}}
                 write_scenario(folder / f"{number}.toml", values)
                 calls += [(try_turn, (folder, f"{number}.toml", sense)) for sense in (1, -1)]
@@ -331,7 +332,7 @@ class Adoption:
         if nominal is None:
             return f"no grasp was found: {self.grasps['reason']}"
         if nominal["kind"] != "gait":
-            return f"no finger can be spared, so that nothing turns in the air without end: {self.grasps['reason']}"
+            return f"it holds with all fingers only: {self.grasps['reason']}"
         if nominal in good:
             return ""
         return (
