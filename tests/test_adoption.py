@@ -144,7 +144,8 @@ def test_the_controller_of_the_same_hand_and_object_is_the_packaged_one() -> Non
 
 ROW: dict[str, Any] = {
     "scenario": "turn.toml", "sense": 1, "asked_rad": 6.0, "turned_rad": 6.0, "dropped": False, "lost_reason": None,
-    "completed": True, "incomplete_reason": None, "link_contacts": 0, "max_position_error_m": 1e-4,
+    "completed": True, "incomplete_reason": None, "link_contacts": 0,
+    "link_contact_at_rad": None, "safe_mode_at_rad": None, "max_position_error_m": 1e-4,
     "max_orientation_error_rad": 0.01, "worst_safe_mode": "normal",
 }  # fmt: skip
 
@@ -154,9 +155,17 @@ ROW: dict[str, Any] = {
     [
         ({}, ""),
         ({"dropped": True, "lost_reason": "it slid"}, "lost: it slid"),
-        ({"turned_rad": 5.0, "incomplete_reason": "turned 286 degrees; stood still"}, "stood still"),
-        ({"turned_rad": -6.0}, "turned -344 of 344 degrees"),
-        ({"link_contacts": 7}, "a link lay on the object in 7"),
+        (
+            {"turned_rad": 5.0, "incomplete_reason": "turned 286 of 300 degrees; stood still"},
+            "turned 286 of 344 degrees; stood",
+        ),
+        ({"turned_rad": -6.0}, "turned back 344 of 344 degrees"),
+        ({"link_contacts": 7, "link_contact_at_rad": 0.5}, "a link lay on the object after 29 degrees, in 7"),
+        ({"link_contacts": 7, "link_contact_at_rad": 0.5, "dropped": True, "lost_reason": "x"}, "steps; then lost: x"),
+        (
+            {"link_contacts": 7, "link_contact_at_rad": 0.5, "safe_mode_at_rad": 0.4, "turned_rad": 1.0},
+            "s; then a link",
+        ),
         ({"max_position_error_m": 2e-3}, "2 mm off, 1 allowed"),
         ({"max_orientation_error_rad": 0.07}, "70 mrad off, 60 allowed"),
     ],

@@ -375,7 +375,7 @@ def test_what_forbids_is_said(
 
 def test_the_search_does_not_depend_on_processes(paper: HandView) -> None:
     few = replace(
-        SMALL, samples=256, positions=2, nearby=1, candidates=6, judged=4, marched=1, generations=1, offspring=4
+        SMALL, samples=64, positions=1, nearby=1, candidates=3, judged=2, marched=1, generations=1, offspring=2
     )
     objects = [ObjectSpec("ball", (0.025,), 0.1), ObjectSpec("cylinder", (0.025, 0.04), 0.1)]
     one = search_grasps(paper, objects, few, workers=1, progress=False)

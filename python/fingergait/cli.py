@@ -267,11 +267,11 @@ def adopt(
 ) -> None:
     """Adopt a hand: grasps, controller, scenarios and a report of what it does; stages that stand are not repeated."""
     from fingergait.adopt import Adoption
-    from fingergait.adopt.command import show_adoption
+    from fingergait.adopt.command import run_adopt, show_adoption
     from fingergait.adopt.family import FAMILIES
 
     chosen = tuple(objects or FAMILIES)
-    values = Adoption(model, facts, out, objects=chosen, mass=mass, quick=quick, workers=workers).report
+    values = run_adopt(Adoption(model, facts, out, objects=chosen, mass=mass, quick=quick, workers=workers))
     if as_json:
         print_json(values)
     else:

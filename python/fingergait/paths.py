@@ -51,7 +51,10 @@ def find(name: str | Path, folder: str, suffix: str, field: str, relative_to: Pa
 
 
 def find_hand(name: str | Path, field: str) -> Path:
-    """Path of the hand's model or facts called `name`: a path as given, or a packaged name."""
+    """Path of the hand's model or facts called `name`: a path as given, a bundle's folder, or a packaged name."""
+    bundled = as_path(name).expanduser() / "hand.xml"
+    if bundled.is_file() and not field.endswith("facts"):
+        return bundled.resolve()
     suffix = ".toml" if field.endswith("facts") else ".xml"
     packaged = MODELS / "hands" / f"{name}{suffix}"
     return packaged.resolve() if packaged.is_file() else find(name, "", suffix, field)

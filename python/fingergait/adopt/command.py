@@ -10,11 +10,13 @@ from rich.table import Table
 
 from fingergait.adopt.options import SearchOptions
 from fingergait.adopt.picture import write_map
+from fingergait.adopt.pipeline import Adoption
 from fingergait.adopt.survey import GraspSearch, objects_for, search_grasps
 from fingergait.adopt.view import view_of
 from fingergait.files import make_folder, whole_file, write_text
 from fingergait.hand import import_hand
 from fingergait.paths import find_hand
+from fingergait.stopping import Stopped
 
 
 def run_grasps(
@@ -36,6 +38,15 @@ def run_grasps(
     values = search.as_json()
     write_text(out / "grasps.json", json.dumps(values, indent=2) + "\n")
     return values
+
+
+def run_adopt(adoption: Adoption) -> dict[str, Any]:
+    """All stages of an adoption; the JSON's values. Where the user stops it, what is done is kept."""
+    try:
+        return adoption.report
+    except Stopped as stop:
+        kept = f"the finished stages are kept in {adoption.out}; the same command goes on from there"
+        raise Stopped(kept, stop.status - 128) from None
 
 
 def show_adoption(values: dict[str, Any], console: Console) -> None:

@@ -50,6 +50,10 @@ FACTORS = (1.0, 0.8, 0.6, 0.45, 0.35)
 coupled closely, what each axis asks for alone is too much for all together."""
 
 
+DESIGNS = ((1.0, 1.0), (1.0, 0.85), (0.6, 0.85))
+"""Factors on the sizes and on the levels gamma of a synthesis, tried in turn: lower levels leave room for couplings."""
+
+
 @dataclass(frozen=True)
 class Fitted:
     """A spec for the new plant and the packaged K scaled for it; `gain` (6,): wrench for an error, over the base's."""
@@ -160,16 +164,19 @@ def design(
     _, fitted, said = min(found, key=lambda entry: entry[0])
     figures: dict[str, Any] = {"kind": "scaled", "gain": fitted.gain.tolist(), "tried": len(found), **said}
     figures["synthesis"] = "not asked for: the scaled controller was enough, or --quick"
-    axes = fitted.axes
     if search and (figures["mu_peak"] is None or figures["mu_peak"] >= 1.0):
-        try:
-            made = synthesize(_thin(fitted.spec), bodies=300)
-        except SynthesisError as error:
-            figures["synthesis"] = f"found none: {error}"
-        else:
-            axes = made.axes
-            figures |= {"kind": "synthesised", "synthesis": "", **mu_of(fitted.spec, axes)}
-    return artefact_of(base, nominal, fitted.spec, axes, figures), figures
+        for factor, level in DESIGNS:
+            spec = fit(base, nominal, radius, hand, lag, factor).spec
+            gamma = [level * gamma for gamma in spec.iteration.gamma]
+            spec = spec.model_copy(update={"iteration": spec.iteration.model_copy(update={"gamma": gamma})})
+            try:
+                axes = synthesize(_thin(spec), bodies=300).axes
+            except SynthesisError as error:
+                figures["synthesis"] = f"found none: {error}"
+            else:
+                figures |= {"kind": "synthesised", "synthesis": "", "sizes": factor, **mu_of(spec, axes)}
+                return artefact_of(base, nominal, spec, axes, figures), figures
+    return artefact_of(base, nominal, fitted.spec, fitted.axes, figures), figures
 
 
 def artefact_of(

@@ -7,6 +7,7 @@ import json
 import os
 import tempfile
 import time
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -110,9 +111,9 @@ class Adoption:
 
     @cached_property
     def view(self) -> HandView:
-        """The bundle's hand as the search sees it."""
-        assert self.hand["files"]
-        return view_of(import_hand(self.out / HAND))
+        """The bundle's hand as the search sees it, under the model's name."""
+        name = self.hand["source"]  # which writes the hand, too
+        return replace(view_of(import_hand(self.out / HAND)), name=name)
 
     @cached_property
     def grasps(self) -> dict[str, Any]:
@@ -147,7 +148,8 @@ class Adoption:
             for number, grasp in enumerate(own):
                 fitted, nominal = self._fitted(base, grasp), nominal_of(grasp.object)
                 artefact_of(base, nominal, fitted.spec, fitted.axes, {}).write(folder / f"{number}.json")
-                turn = {**self._turn(grasp), "duration": LENGTH}
+                turn = self._turn(grasp)
+                turn["duration"] = min(LENGTH, turn["duration"])
                 values = {**self._start(grasp), **turn, "controller": {"file": f"{number}.json"}}
                 write_scenario(folder / f"{number}.toml", values)
                 calls += [(try_turn, (folder, f"{number}.toml", sense)) for sense in (1, -1)]
@@ -306,6 +308,7 @@ class Adoption:
             "mu_peak": self.controller.get("mu_peak"),
             "controller": self.controller,
             "verified": [{k: v for k, v in entry.items() if k != "rows"} for entry in verified],
+            "tried": [_tried(entry) for entry in self.tried],
             "not_possible": [
                 {
                     "object": str(ObjectSpec(e["family"], tuple(e["size"]), e["mass"])),
@@ -329,7 +332,7 @@ class Adoption:
         if nominal is None:
             return f"no grasp was found: {self.grasps['reason']}"
         if nominal["kind"] != "gait":
-            return f"no finger can be spared, so that nothing turns in the air without end: {self.grasps['reason']}"
+            return f"it holds with all fingers only: {self.grasps['reason']}"
         if nominal in good:
             return ""
         return (
@@ -356,6 +359,19 @@ def nominal_of(spec: ObjectSpec) -> Nominal:
     """The homogeneous body of an object: mass and principal moments."""
     first, second, third = (float(x) for x in spec.shape.inertia(spec.mass))
     return Nominal(spec.mass, (first, second, third))
+
+
+def _tried(entry: dict[str, Any]) -> dict[str, Any]:
+    """An object that was turned to choose among them, and what came of it, for the report."""
+    grasp, (forwards, backwards) = Grasp.from_json(entry["grasp"]), entry["rows"]
+    return {
+        "object": str(grasp.object),
+        "stroke_rad": grasp.stroke,
+        "asked_rad": forwards["asked_rad"],
+        "turned_forwards_rad": forwards["turned_rad"],
+        "turned_backwards_rad": -backwards["turned_rad"],
+        "fails": forwards["fails"] or backwards["fails"],
+    }
 
 
 def _text(values: Any) -> str:

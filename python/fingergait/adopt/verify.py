@@ -10,6 +10,7 @@ import numpy as np
 
 from fingergait._core import FingergaitError
 from fingergait.run.log import Log
+from fingergait.run.pose_error import yaw_reached
 from fingergait.run.report.film import film_strip
 from fingergait.run.simulate import simulate
 from fingergait.scenario import Scenario
@@ -73,6 +74,8 @@ def run_trial(folder: Path, trial: Trial) -> dict[str, Any]:
         "ended_early": watch.ended,
         "friction": scenario.truth.friction,
         "mass_scale": scenario.truth.mass_scale,
+        "link_contact_at_rad": _first(run.log, "link_contact"),
+        "safe_mode_at_rad": _first(run.log, "safe_mode"),
         **{key: metrics[key] for key in _KEPT},
     }
     fails = failing(row, turns=asked != 0.0)
@@ -97,24 +100,38 @@ _KEPT = (
 
 
 def failing(row: dict[str, Any], turns: bool) -> str:
-    """What a run failed first, in words: lost, not turned, links, errors; empty where it did all that is asked."""
+    """What a run failed, in words, what came first first; empty where it did all that is asked."""
+    words = _failing_at_the_end(row, turns)
+    if not row["link_contacts"]:
+        return words
+    at, stood = row["link_contact_at_rad"], row["safe_mode_at_rad"]
+    link = f"a link lay on the object after {np.rad2deg(at):.0f} degrees, in {row['link_contacts']} control steps"
+    if stood is not None and stood < at and words:
+        return f"{words}; then {link}"
+    return f"{link}; then {words}" if words else link
+
+
+def _failing_at_the_end(row: dict[str, Any], turns: bool) -> str:
     if row["dropped"]:
         return f"lost: {row['lost_reason']}"
     if turns and row["turned_rad"] / row["asked_rad"] < REACHED:
-        return row["incomplete_reason"] or (
-            f"turned {np.rad2deg(row['turned_rad']):.0f} of {np.rad2deg(row['asked_rad']):.0f} degrees"
-        )
+        reached, asked = abs(np.rad2deg([row["turned_rad"], row["asked_rad"]]))
+        _, _, why = (row["incomplete_reason"] or "").partition("; ")
+        back = "back " if row["turned_rad"] * row["asked_rad"] < 0.0 else ""
+        return f"turned {back}{reached:.0f} of {asked:.0f} degrees" + (f"; {why}" if why else "")
     if not turns and not row["completed"]:
         return str(row["incomplete_reason"])
-    if row["link_contacts"]:
-        return f"a link lay on the object in {row['link_contacts']} control steps"
-    for key, limit, unit in (
-        ("max_position_error_m", POSITION, "mm"),
-        ("max_orientation_error_rad", ORIENTATION, "mrad"),
-    ):
+    limits = (("max_position_error_m", POSITION, "mm"), ("max_orientation_error_rad", ORIENTATION, "mrad"))
+    for key, limit, unit in limits:
         if turns and row[key] is not None and row[key] > limit:
             return f"{1e3 * row[key]:.2g} {unit} off, {1e3 * limit:g} allowed"
     return ""
+
+
+def _first(log: Log, column: str) -> float | None:
+    """How far, rad, the object had turned when the column first was not zero after t = 0; None where it never was."""
+    found = np.flatnonzero((log[column] != 0.0) & (log.t >= 0.0))
+    return abs(float(yaw_reached(log.pose("object"))[found[0]])) if len(found) else None
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -145,18 +162,19 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _kind(fails: str) -> str:
-    """The words before the first figure or colon, by which failures are counted."""
+    """What kind of failure the words tell of first, by which failures are counted."""
+    first = fails.partition("; then ")[0]
     for mark, kind in (
+        ("a link", "a link lies on the object"),
         ("lost", "the object is lost"),
         ("refused", "the start is refused"),
-        ("a link", "a link lies on the object"),
         ("stood still", "the controller stands in a safe mode before the turn is done"),
         ("turned", "the turn is not reached"),
-        (" off", "the errors are too large"),
+        (" off, ", "the errors are too large"),
     ):
-        if fails.startswith(mark) or (mark in fails and mark in ("stood still", " off")):
+        if first.startswith(mark) or (mark in first and mark in ("stood still", " off, ")):
             return kind
-    return fails
+    return first
 
 
 def _median(values: list[float]) -> float | None:

@@ -25,8 +25,9 @@ else:
 
 
 class HandConfig(Table):
-    """The hand: an MJCF or URDF file, or a packaged name; its facts file (absent: `<stem>.facts.toml` beside it); pose
-    of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where the file's own does not serve."""
+    """The hand: an MJCF or URDF file, an adopted bundle's folder, or a packaged name; its facts file (absent:
+    `<stem>.facts.toml` beside it); pose of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where
+    the file's own does not serve."""
 
     file: str = "hand"
     facts: str | None = None
@@ -295,8 +296,10 @@ def _item(items: list[Any], part: str, key: str) -> Any:
 def _resolve_beside(values: dict[str, Any], table: str, key: str, folder: Path) -> None:
     """Makes a file that a scenario names relative to itself absolute; packaged names stay as they are."""
     entry = values.get(table)
-    if isinstance(entry, dict) and isinstance(entry.get(key), str) and (folder / entry[key]).is_file():
-        entry[key] = as_text((folder / entry[key]).resolve())
+    if isinstance(entry, dict) and isinstance(entry.get(key), str):
+        beside = folder / entry[key]
+        if beside.is_file() or (beside / "hand.xml").is_file():  # a bundle's folder
+            entry[key] = as_text(beside.resolve())
 
 
 def _describe(error: ValidationError) -> str:
