@@ -142,7 +142,7 @@ def test_the_object_is_held_while_a_finger_looks_for_it() -> None:
 @pytest.mark.parametrize("seed", [5, 9])
 def test_the_object_is_held_where_no_finger_can_be_spared(seed: int) -> None:
     # 0.6 kg at friction 0.4: three fingers cannot carry it, and turning on with four would lose it.
-    overrides = {"seed": seed, "truth": {"friction": 0.4, "mass_scale": 1.2}, "gait.change": "gait"}
+    overrides = {"seed": seed, "truth": {"friction": 0.4, "mass_scale": 1.2}}
     run = fg.simulate(Scenario.load("slippery", overrides))
     assert not run.metrics["dropped"]
     assert np.any(run.log["faults"].astype(int) & BITS["overdue"])

@@ -141,7 +141,7 @@ impl Default for GaitConfig {
     fn default() -> Self {
         Self {
             enabled: true,
-            change: Change::Auto,
+            change: Change::Gait,
             w1: 0.99,
             w2: 0.02,
             w_z: 8.0,

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum Change {
     /// By gaits while a finger can be spared; by setting down and regrasping where none can and a support is below.
-    #[default]
     Auto,
     /// By gaits only.
+    #[default]
     Gait,
     /// By setting down and regrasping only.
     Regrasp,
