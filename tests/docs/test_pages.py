@@ -19,7 +19,12 @@ QUICK = {
     "campaign": ["--samples", "1", "--workers", "1"],
     "bench": ["--quick"],
 }
-LONG = ("synthesize", "reproduce")  # minutes, however quick: their options are read, and tests of their own run them
+LONG = (
+    "synthesize",
+    "reproduce",
+    "adopt",
+    "grasps",
+)  # minutes, however quick: their options are read, and tests of their own run them
 # On these pages the object is lost, or the log is read afterwards: they need the time that they take.
 AS_WRITTEN = ("truth.friction=0.05", "--out runs/mine")
 
