@@ -24,7 +24,7 @@ LONG = (
     "reproduce",
     "adopt",
     "grasps",
-)  # minutes, however quick: their options are read, and tests of their own run them
+)  # minutes: options are read; tests of their own run them
 # On these pages the object is lost, or the log is read afterwards: they need the time that they take.
 AS_WRITTEN = ("truth.friction=0.05", "--out runs/mine")
 
