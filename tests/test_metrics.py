@@ -86,6 +86,10 @@ def test_recovery_is_measured_from_the_pulses_end_above_the_level_before(kind: s
     signals = (error, other) if kind == "force" else (other, error)
     assert recovery_time(t, *signals, pulse, float("inf")) == pytest.approx(decay * np.log(10.0), abs=2e-3)
     assert recovery_time(t, *signals, pulse, 2.3) is None  # the next pulse comes first
+    # What a gait brings a second later is not the pulse's; what comes back at once is.
+    for late, time in ((1.5, decay * np.log(10.0)), (0.6, 0.7)):
+        error[(t >= end + late) & (t < end + late + 0.1)] = 1.0
+        assert recovery_time(t, *signals, pulse, float("inf")) == pytest.approx(time, abs=2e-3)
 
 
 def make_log(scenario: Scenario, steps: int) -> Log:

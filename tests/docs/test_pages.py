@@ -21,7 +21,7 @@ QUICK = {
     "bench": ["--quick"],
 }
 # Minutes, however quick, or without an end: their options are read, and tests of their own run them.
-LONG = ("synthesize", "reproduce", "play", "show")
+LONG = ("synthesize", "reproduce", "adopt", "grasps", "play", "show")
 # On these pages the object is lost, or the log is read afterwards: they need the time that they take.
 AS_WRITTEN = ("truth.friction=0.05", "--out runs/mine")
 

@@ -18,6 +18,7 @@ CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 SETTLED = 0.05  # of the step, the paper's threshold
 RECOVERED = 0.10  # of the peak
 _BEFORE = 1.0  # s before a pulse that say how large the error was without it; a gait takes about as long
+_STAYED = 0.3  # s that the error must stay back: longer than K swings, shorter than until a later gait brings its own
 _AFTER = 2.0  # s after a pulse in which its peak and recovery are sought, unless the next one begins
 
 
@@ -99,9 +100,10 @@ def settling_times(t: Array, errors: Array, step: tuple[float, ...], at: float) 
 
 
 def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturbance, until: float) -> float | None:
-    """Time from a pulse's end until the error it caused has gone for good, s; None where it hasn't by `until`.
+    """Time from a pulse's end until the error it caused has gone, s; None where it hasn't by `until`.
 
-    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it. A force is
+    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it, and there for 0.3 s:
+    what a gait brings later is not the pulse's. A force is
     judged by the position error (T,), a torque by the orientation error (T,), both by the later of the two.
     """
     times = []
@@ -114,11 +116,11 @@ def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturba
             return None
         level = before.max()
         limit = level + RECOVERED * max(0.0, error[window].max() - level)
-        end = pulse.at + pulse.duration
-        time = _last_true(t[window], error[window] > limit, end)
+        after = window & (t >= pulse.at + pulse.duration)
+        time = _back(t[after], error[after] > limit)
         if time is None:
             return None
-        times.append(max(0.0, time))
+        times.append(time)
     return max(times, default=None)
 
 
@@ -176,6 +178,18 @@ def _last_true(t: Array, outside: NDArray[np.bool_], begin: float) -> float | No
     if not len(last):
         return 0.0
     return None if last[-1] + 1 >= len(t) else float(t[last[-1] + 1] - begin)
+
+
+def _back(t: Array, outside: NDArray[np.bool_]) -> float | None:
+    """Time from the first sample until none is `outside` for `_STAYED`, or any more; None where the last one is."""
+    if not len(t) or outside[-1]:
+        return None
+    begin = 0
+    for last in np.flatnonzero(outside):
+        if t[last] - t[begin] >= _STAYED:
+            break
+        begin = last + 1
+    return float(t[begin] - t[0])
 
 
 def _next_start(scenario: Scenario, pulse: Disturbance) -> float:
