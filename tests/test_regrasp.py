@@ -49,8 +49,8 @@ def turned_in_air(run: fg.Run) -> float:
     [
         ("regrasp-cylinder", 2.0, 1.2, 570.0, 12.0),
         ("regrasp-cylinder", -2.0, 0.8, 570.0, 12.0),
-        ("regrasp-cube", 2.0, 0.8, 340.0, 30.0),
-        ("regrasp-cube", -2.0, 1.2, 340.0, 30.0),
+        ("regrasp-cube", 2.0, 0.8, 340.0, 40.0),
+        ("regrasp-cube", -2.0, 1.2, 340.0, 40.0),
     ],
 )
 def test_three_fingers_turn_an_object_on_a_table_without_end(
