@@ -102,9 +102,9 @@ def settling_times(t: Array, errors: Array, step: tuple[float, ...], at: float) 
 def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturbance, until: float) -> float | None:
     """Time from a pulse's end until the error it caused has gone, s; None where it hasn't by `until`.
 
-    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it, and there for 0.3 s:
-    what a gait brings later is not the pulse's. A force is
-    judged by the position error (T,), a torque by the orientation error (T,), both by the later of the two.
+    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it, and there for
+    0.3 s: what a gait brings later is not the pulse's. A force is judged by the position error (T,), a torque by the
+    orientation error (T,), both by the later of the two.
     """
     times = []
     for error, cause in ((position, pulse.force), (orientation, pulse.torque)):
