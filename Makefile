@@ -31,7 +31,7 @@ demo: setup
 
 test: setup wheel
 	cargo test --workspace --locked --quiet
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # The installed wheel, away from the checkout, finds its models.
 wheel: setup
