@@ -29,7 +29,7 @@ from fingergait.view.inputs import CONTROLS, FAULT_TIME, FORCE, Inputs
 from fingergait.view.pacer import Pacer
 from fingergait.view.pose import PHASES, Pose
 from fingergait.view.reach import reach
-from fingergait.view.words import CAUSES, explain
+from fingergait.view.words import CAUSES, REGRASPING, explain
 
 if server.missing is not None:
     pytest.skip("expected the packages of the live page: pip install 'fingergait[view]'", allow_module_level=True)
@@ -253,6 +253,15 @@ def test_words_say_what_happens_and_why(turning: tuple[Log, Scenario]) -> None:
     assert any("Q is above its threshold. 4 fingers hold with " in words for words in said)
     lost = explain(poses(log, scenario, [900])[0], "the position error passed 10 mm")
     assert lost == "The object is lost: the position error passed 10 mm. Reset begins anew."
+
+
+def test_words_follow_an_object_that_is_set_down_and_taken_again() -> None:
+    assert list(REGRASPING) == [name for name in fg.Diagnostics.regrasp_phase_names() if name not in ("idle", "turn")]
+    scenario = Scenario.load("regrasp-cylinder", {"duration": 3.0})
+    log = fg.simulate(scenario).log
+    said = " ".join(explain(pose) for pose in poses(log, scenario, range(0, len(log), 10)))
+    for words in ("goes down until it is felt to lie", "all fingers go back round it", "is lifted again"):
+        assert words in said
 
 
 # --- rows ---

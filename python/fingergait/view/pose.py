@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from fingergait.run.regrasping import PHASES as REGRASP
 from fingergait.run.verdict import FAULTS, MODES
 from fingergait.sim.press import independent
 from fingergait.sim.scene import SceneModel, torque_limits
@@ -69,6 +70,11 @@ class Pose:
     def phase(self) -> str:
         """Phase of the gait."""
         return PHASES[int(self.row["phase"])]
+
+    @property
+    def regrasp(self) -> str:
+        """Phase of setting down and taking again; "idle" where that is not how the hand turns."""
+        return REGRASP[int(self.row["regrasp"])]
 
     @property
     def safe_mode(self) -> str:

@@ -39,6 +39,21 @@ _MODES = {
 }
 
 
+REGRASPING = {
+    "brake": "the turn comes to rest: the object is to be set down for a new grasp",
+    "lower": "the object goes down until it is felt to lie",
+    "release": "the object lies: the fingers give up what they carry",
+    "return": "the object lies: all fingers go back round it",
+    "approach": "the fingers go in until each feels the object",
+    "preload": "the fingers press the object that still lies",
+    "check": "the fingers take the weight, to see whether the grasp holds",
+    "lift": "the object is lifted again",
+    "stand": "no support was found below the object: it is held in the air",
+    "rest": "too many grasps have failed: the object is left where it lies",
+}
+"""What is done in each phase of setting down and taking again but the turn itself."""
+
+
 def explain(pose: Pose, lost: str | None = None) -> str:
     """One or two sentences on a row.
 
@@ -57,6 +72,9 @@ def explain(pose: Pose, lost: str | None = None) -> str:
     if mode != "normal":
         causes = "; ".join(CAUSES[name] for name in pose.faults) or "it waits until all is well again"
         return f"{mode}: {_MODES[mode]}, because {causes}. {_others(pose, None)}"
+    if pose.regrasp in REGRASPING:
+        said = REGRASPING[pose.regrasp]
+        return f"{said[0].upper()}{said[1:]}. {_others(pose, None)}"
     error = pose_errors(pose.row.group("object")[None], pose.row.group("desired")[None])[0]
     off = f"{1e3 * np.linalg.norm(error[:3]):.1f} mm and {np.linalg.norm(error[3:]):.3f} rad off"
     k = pose.free
