@@ -188,7 +188,7 @@ def _back(t: Array, outside: NDArray[np.bool_]) -> float | None:
     for last in np.flatnonzero(outside):
         if t[last] - t[begin] >= _STAYED:
             break
-        begin = last + 1
+        begin = int(last) + 1
     return float(t[begin] - t[0])
 
 
