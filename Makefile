@@ -2,9 +2,11 @@
 # make demo    the main job: lift a cylinder and turn it without end
 # make test    every test
 # make check   formats, lints and types; warnings fail
+# make docs    the documentation, with its pictures, as pages in site/
 # make bench   how long a control step takes
 # make recordings  the runs that the benches and tests of the core replay, anew: after each change of what is commanded
 # make reference   what `fingergait bench` compares with, anew: after each change that is meant to change it
+# make picture  the picture of the live page in docs/: after each change of what it looks like; needs Chromium
 # make fuzz    the core's steps and parsers on anything at all, under AddressSanitizer; needs a nightly toolchain
 # make miri    the core's unit tests in an interpreter that knows undefined behaviour; needs a nightly toolchain
 # make daqp    the force QP beside DAQP's C code, in one program; needs a C compiler
@@ -19,16 +21,17 @@ BIN := .venv/bin
 missing = { echo "make: expected $(1), found none; get it: $(2)" >&2; exit 1; }
 SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock pyproject.toml
 
-.PHONY: setup demo test wheel check bench recordings reference daqp fuzz miri clean
+.PHONY: setup demo test wheel check docs bench recordings reference picture daqp fuzz miri clean
 
 setup: .venv/.module
 
 demo: setup
 	$(BIN)/fingergait run lift-and-rotate
+	@echo "see it live, and play with it: .venv/bin/fingergait play"
 
 test: setup wheel
 	cargo test --workspace --locked --quiet
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # The installed wheel, away from the checkout, finds its models.
 wheel: setup
@@ -47,6 +50,11 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# The pictures are drawn and rustdoc's pages added by docs/hooks.py; a warning is an error.
+docs: setup
+	RUSTDOCFLAGS='-D warnings' cargo doc --no-deps --locked --quiet --package fg-core
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
 bench: setup
 	cargo bench --workspace --locked
 	$(BIN)/fingergait bench
@@ -62,9 +70,12 @@ recordings: setup
 	$(RECORD) $(RECORDINGS)/noisy.rec --set duration=6 $(SENSORS:%=--set sensors.%)
 
 reference: setup
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,peers]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view,docs,peers]'
 	$(BIN)/fingergait bench --out runs/reference
 	cp runs/reference/bench.json models/bench/reference.json
+
+picture: setup
+	$(BIN)/python -m fingergait.view.screenshot docs/live.png
 
 # AddressSanitizer is in all three; what they find new stays in target/.
 FUZZ_SECONDS ?= 60
@@ -86,12 +97,12 @@ daqp: setup
 	DAQP_SOURCE="$$folder/daqp-0.11.0" cargo run --release --locked --quiet --manifest-path crates/fg-core/daqp/Cargo.toml
 
 clean:
-	rm -rf .venv target
+	rm -rf .venv target site docs/pictures
 
 # The pinned dependencies are there already, or, on Python 3.10, come with the module by the ranges of pyproject.toml.
 .venv/.module: .venv/.dependencies $(SOURCES)
 	@command -v cargo > /dev/null || $(call missing,a stable Rust toolchain,https://rustup.rs or: apt-get install cargo)
-	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video]'
+	MATURIN_PEP517_ARGS=--locked $(BIN)/pip install --quiet --no-build-isolation --editable '.[video,view,docs]'
 	@touch $@
 
 .venv/.dependencies: requirements.lock pyproject.toml

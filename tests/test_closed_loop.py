@@ -110,7 +110,7 @@ def test_a_run_is_faster_than_real_time_and_a_step_below_a_millisecond() -> None
         ({"gait__w3": 1.0}, fg.ConfigError, "w3"),
         ({"gait__sigma": -1.0}, fg.ConfigError, "gait.sigma"),
         ({"safety__x": 1.0}, fg.ConfigError, "x|safety"),
-        ({"object__size": [0.2, 0.06]}, fg.ConfigError, "object.size: expected an object whose side finger f0"),
+        ({"object__size": [0.2, 0.06]}, fg.ConfigError, "object: expected an object that finger f0 can touch"),
         (
             {"object__size": [0.085, 0.06]},
             fg.ConfigError,

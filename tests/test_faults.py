@@ -50,7 +50,7 @@ def injection(scene: SceneModel, **fault: Any) -> Injection:
 
 def spoiled(faults: Injection, t: float) -> tuple[float, Reading]:
     reading = clean(t)
-    said = faults.read(t, reading.q, reading.tau, reading.pose, reading.place, reading.force)
+    said = faults.read(t, reading.q.reshape(-1), reading.tau.reshape(-1), reading.pose, reading.place, reading.force)
     return said, reading
 
 
@@ -100,6 +100,21 @@ def test_a_pose_jumps_by_its_shift_and_stands_still_when_stale(scene: SceneModel
     np.testing.assert_array_equal(found["pose"], clean(1.0).pose)
 
 
+def test_reads_fail_scales_and_axes_differ(scene: SceneModel) -> None:
+    found = differing(scene, kind="encoder_dropout", share=1.0)
+    assert set(found) == {"q"} and not found["q"].any()
+    faults = injection(scene, kind="encoder_dropout", share=0.3)
+    zeros = [not spoiled(faults, 1.0 + k / 2000)[1].q.any() for k in range(1000)]
+    assert 0.25 < np.mean(zeros) < 0.35
+    found = differing(scene, kind="tactile_scale", factor=0.1)
+    np.testing.assert_allclose(found["force"], 0.1 * clean(1.5).force)
+    faults = injection(scene, kind="tactile_axes", order=[2, 0, 1])
+    reading = clean(1.5)
+    reading.place[:] = [1.0, 2.0, 3.0]
+    faults.read(1.5, reading.q, reading.tau, reading.pose, reading.place, reading.force)
+    np.testing.assert_array_equal(reading.place, np.tile([3.0, 1.0, 2.0], (4, 1)))
+
+
 def test_encoders_stick_and_leave_their_range(scene: SceneModel) -> None:
     found = differing(scene, kind="encoder_stuck", finger=2, joint=0)
     np.testing.assert_array_equal(found["q"] != clean(1.5).q, only((4, 3), (2, 0)))
@@ -132,7 +147,7 @@ def test_swapped_joints_are_swapped_in_readings_and_commands(scene: SceneModel) 
     right = clean(1.5)
     np.testing.assert_array_equal(found["q"][1], right.q[1, [2, 1, 0]])
     faults = injection(scene, **fault)
-    np.testing.assert_array_equal(faults.command(1.5, right.tau)[1], right.tau[1, [2, 1, 0]])
+    np.testing.assert_array_equal(faults.command(1.5, right.tau.ravel()).reshape(4, 3)[1], right.tau[1, [2, 1, 0]])
     np.testing.assert_array_equal(faults.command(2.5, right.tau), right.tau)
 
 

@@ -87,7 +87,7 @@ def test_forces_are_the_minimiser(solver: str, n: int, m: int, push: float) -> N
         s = optimizer.solve(**q)
         assert s.status == "solved"
         assert s.solver == {"active_set": "active_set", "clarabel": "clarabel_polished"}[solver]
-        assert s.kkt < 1e-7
+        assert s.kkt < 1e-8 * max(10.0, np.abs(s.f).max())
         assert s.solve_ns > 0
         # The reference itself is good to about 1e-7 N where many rows are active.
         np.testing.assert_allclose(s.f, reference(edges, q), atol=1e-6, rtol=0)

@@ -86,12 +86,16 @@ def test_recovery_is_measured_from_the_pulses_end_above_the_level_before(kind: s
     signals = (error, other) if kind == "force" else (other, error)
     assert recovery_time(t, *signals, pulse, float("inf")) == pytest.approx(decay * np.log(10.0), abs=2e-3)
     assert recovery_time(t, *signals, pulse, 2.3) is None  # the next pulse comes first
+    # What a gait brings a second later is not the pulse's; what comes back at once is.
+    for late, time in ((1.5, decay * np.log(10.0)), (0.6, 0.7)):
+        error[(t >= end + late) & (t < end + late + 0.1)] = 1.0
+        assert recovery_time(t, *signals, pulse, float("inf")) == pytest.approx(time, abs=2e-3)
 
 
 def make_log(scenario: Scenario, steps: int) -> Log:
     """A log of a perfect run: every number zero, the poses upright and equal."""
     fingers = ["f0", "f1", "f2", "f3"]
-    log = Log(columns(fingers, 3), fingers, 16)
+    log = Log(columns(fingers, [3] * len(fingers)), fingers, 16)
     log.metadata = {"scenario": json.dumps(scenario.model_dump(mode="json", exclude_unset=True))}
     for k in range(steps):
         row = log.append(k * scenario.period)

@@ -83,7 +83,7 @@ def test_the_true_object_is_what_the_scenario_says() -> None:
     np.testing.assert_allclose(model.body_ipos[body], [0.001, 0.0, 0.002])
     np.testing.assert_allclose(model.dof_damping[scene.v], 0.1)
     np.testing.assert_allclose(model.actuator_dynprm[scene.act, 0], 0.02)
-    np.testing.assert_allclose(torque_limits(scene), 0.5)
+    np.testing.assert_allclose(torque_limits(scene), np.array([[-0.5], [0.5]]) * np.ones(N * M))
     contacts = plant.data.contact
     on_object = (contacts.geom == model.geom(OBJECT).id).any(axis=1)
     assert on_object.sum() >= N + 3  # the tips, and the palm at three points or more
@@ -132,7 +132,7 @@ def test_tactile_sensors_agree_with_the_simulators_contacts() -> None:
     seen = []
     for index in range(data.ncon):
         contact = data.contact[index]
-        tips = np.flatnonzero(np.isin(scene.tips, contact.geom))
+        tips = np.flatnonzero(np.isin([finger.tip for finger in scene.fingers], contact.geom))
         if not len(tips):
             continue
         finger = int(tips[0])

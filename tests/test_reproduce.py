@@ -174,7 +174,7 @@ def test_a_value_that_the_hand_cannot_start_with_is_beyond_the_limit() -> None:
     found = bisect(limit, 0, 1)
     assert found.held is not None and found.held < 300.0
     assert found.trials[1].reason == "the hand can't start with it"
-    assert "reach" in found.trials[1].end
+    assert "can touch" in found.trials[1].end
 
 
 @pytest.mark.parametrize("geometric", [True, False])

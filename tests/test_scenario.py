@@ -13,7 +13,7 @@ from fingergait.paths import MODELS
 from fingergait.scenario import Scenario, parse_override
 
 BAD: dict[str, Any] = {
-    "object.masss": (0.5, "object.masss: expected one of shape, size, mass, found an unknown key"),
+    "object.masss": (0.5, "object.masss: expected one of shape, size, mass, pose, found an unknown key"),
     "objekt.mass": (0.5, "objekt: expected one of name"),
     "object.mass": (-0.5, "object.mass: expected greater than 0, found -0.5"),
     "object.shape": ("ball", "object.shape: expected 'cylinder', 'ellipsoid', 'box' or 'cone', found 'ball'"),

@@ -14,14 +14,14 @@ ROOT = Path(fg.__file__).resolve().parent
 # Each wing may import those before it. Wings on one floor don't know each other.
 FLOORS = [
     ["_core"],
-    ["paths"],
+    ["fields", "paths", "files", "stopping"],
     ["hand", "object"],
     ["scenario"],
     ["sim"],
     ["run"],
-    ["synthesis"],
-    ["campaign", "reproduce", "bench"],
-    ["check"],
+    ["synthesis", "view"],
+    ["campaign", "reproduce", "bench", "adopt"],
+    ["check", "catalogue"],
     ["_former_names"],
     ["cli"],
 ]

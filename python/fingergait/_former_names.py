@@ -4,7 +4,7 @@ import sys
 
 from fingergait.object import shapes
 from fingergait.run import log, loss, metrics, pose_error, simulate
-from fingergait.scenario import core_config, faults, fields, reference
+from fingergait.scenario import core_config, faults, reference
 from fingergait.sim import gl, injection, plant, scene, sensors, start
 
 _FORMER = {"config": core_config, "model": scene}
@@ -16,7 +16,6 @@ _SAME = (
     pose_error,
     simulate,
     faults,
-    fields,
     reference,
     gl,
     injection,

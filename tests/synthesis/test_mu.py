@@ -7,6 +7,8 @@ import pytest
 import slycot
 
 from fingergait.synthesis import mu_bounds
+from fingergait.synthesis.blocks import parse_blocks
+from fingergait.synthesis.mu_upper import upper_bound
 from fingergait.synthesis.statespace import close_loop
 
 from .distillation import BLOCKS, OMEGA, generalized_plant, inverse_controller
@@ -122,6 +124,41 @@ def test_scaling_and_invariance():
     np.testing.assert_allclose(mu_bounds(1e-3j * M, blocks)[0], 1e-3 * upper, rtol=1e-4)
     d = np.array([1e4, 1.0, 1.0, 1e-3, 1e-3])
     np.testing.assert_allclose(mu_bounds(d[:, None] * M / d, blocks)[0], upper, rtol=1e-4)
+
+
+@pytest.mark.parametrize("blocks", [[(1, 1), (2, 2), (2, 0)], [(-1, 0), (-2, 0), (2, 2)], [(-1, 0)] * 5, [(5, 5)]])
+def test_bounds_are_homogeneous_over_all_numbers(blocks):
+    """mu(c M) = |c| mu(M), to the last digit for powers of two, also for many sizes at once."""
+    M = random_matrices(1, 5, 5, 7)
+    upper, lower = mu_bounds(M, blocks)
+    assert 0.0 <= lower[0] <= upper[0] and upper[0] > 0.0
+    for c in (1e-300, 1e-200, 1e-12, 1e12, 1e200, 1e300):
+        np.testing.assert_allclose(np.divide(mu_bounds(c * M, blocks), c), [upper, lower], rtol=1e-5)
+    powers = 2.0 ** np.array([-900, -40, 0, 40, 900])
+    many = mu_bounds(powers[:, None, None] * M, blocks)
+    np.testing.assert_allclose(many[0], powers * upper, rtol=1e-12)
+    np.testing.assert_allclose(many[1], powers * lower, rtol=1e-12)
+
+
+def test_scalings_of_a_huge_matrix_prove_its_bound():
+    """M^H Dz M + j (G M - M^H G^H) <= value^2 Dw holds where its squares can be computed."""
+    blocks = parse_blocks([(-1, 0), (-2, 0), (2, 2)])
+    M = 1e100 * random_matrices(1, 5, 5, 8)
+    proof = upper_bound(M, blocks)
+    N, G, value = M / 1e100, proof.G / 1e100, proof.value / 1e100
+    NH = np.conj(np.swapaxes(N, 1, 2))
+    skew = 1j * (G @ N)
+    left = NH @ proof.Dz @ N + skew + np.conj(np.swapaxes(skew, 1, 2))
+    gap = value[:, None, None] ** 2 * proof.Dw - left
+    assert np.linalg.eigvalsh(gap).min() >= -1e-9 * np.abs(left).max()
+
+
+@pytest.mark.parametrize(("value", "shown"), [(np.nan, "nan"), (np.inf, "inf"), (complex(0.0, -np.inf), "inf")])
+def test_numbers_that_are_not_finite_are_named(value, shown):
+    M = np.ones((2, 3, 3), complex)
+    M[1, 2, 0] = value
+    with pytest.raises(ValueError, match=rf"M\[1, 2, 0\]: expected a finite number, found .*{shown}"):
+        mu_bounds(M, [(1, 1), (2, 2)])
 
 
 def test_zero_and_nilpotent_matrices():

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::manipulation::force::SolverChoice;
+use crate::regrasp::config::{Change, RegraspConfig};
 use crate::safety::config::SafetyConfig;
 use serde::{Deserialize, Serialize};
 
@@ -21,8 +22,13 @@ pub struct Config {
     pub robust: RobustConfig,
     /// Section II: the joint torque controller.
     pub torque: TorqueConfig,
+    /// The second way to change contacts: set down, take again. Deviation: not in the paper.
+    pub regrasp: RegraspConfig,
     /// When a measurement is not believed, and what then happens. Deviation: the paper's sensors work.
     pub safety: SafetyConfig,
+    /// Marks of the [`crate::rules`] whose fields were stated.
+    #[serde(skip)]
+    pub(crate) stated: u32,
 }
 
 impl Default for Config {
@@ -34,7 +40,9 @@ impl Default for Config {
             force: ForceConfig::default(),
             robust: RobustConfig::default(),
             torque: TorqueConfig::default(),
+            regrasp: RegraspConfig::default(),
             safety: SafetyConfig::default(),
+            stated: 0,
         }
     }
 }
@@ -55,6 +63,8 @@ pub enum QualityPlane {
 pub struct GaitConfig {
     /// False: all fingers always hold the object.
     pub enabled: bool,
+    /// How contacts are changed: "auto", "gait" or "regrasp". Deviation: the paper's hand has gaits only.
+    pub change: Change,
     /// Weight of the object grasp quality Q_o, 1/m^2, eq. (1).
     pub w1: f64,
     /// Weight of the hand manipulability Q_h, eq. (1).
@@ -131,6 +141,7 @@ impl Default for GaitConfig {
     fn default() -> Self {
         Self {
             enabled: true,
+            change: Change::Gait,
             w1: 0.99,
             w2: 0.02,
             w_z: 8.0,
@@ -192,7 +203,7 @@ pub struct ForceConfig {
     pub tau_rate_max: f64,
     /// Which solver answers first.
     pub solver: SolverChoice,
-    /// KKT residual up to which an answer is certified, N.
+    /// KKT residual up to which an answer is certified, relative to its largest contact force.
     pub tolerance: f64,
     /// Lower the assumed friction while fingers slip. Deviation: the paper relocates the slipping finger only.
     pub adapt_friction: bool,
@@ -221,7 +232,7 @@ impl Default for ForceConfig {
             f_n_max: 25.0,
             tau_rate_max: 100.0,
             solver: SolverChoice::ActiveSet,
-            tolerance: 1e-7,
+            tolerance: 1e-8,
             adapt_friction: true,
             slip_speed: 0.012,
             slip_factor: 0.9,
@@ -278,12 +289,19 @@ impl Default for TorqueConfig {
 }
 
 impl Config {
-    /// The configuration written in `json`; absent fields keep their defaults.
+    /// The configuration written in `json`; absent fields keep their defaults, which [`crate::rules`] fits to the grasp.
     pub fn from_json(json: &str) -> Result<Self, Error> {
-        let config: Self = serde_json::from_str(json)
-            .map_err(|e| Error::config("config", "the fields and types of Config", e))?;
+        let wrong = |e| Error::config("config", "the fields and types of Config", e);
+        let mut config: Self = serde_json::from_str(json).map_err(wrong)?;
+        config.stated = crate::rules::stated(&serde_json::from_str(json).map_err(wrong)?);
         config.validate()?;
         Ok(config)
+    }
+
+    /// The gaits' parameters, gaits off where contacts are changed by regrasping only.
+    pub(crate) fn gaits(&self) -> GaitConfig {
+        let regrasps = self.gait.change == Change::Regrasp;
+        GaitConfig { enabled: self.gait.enabled && !regrasps, ..self.gait.clone() }
     }
 
     /// An error that names the first field out of its range.
@@ -351,6 +369,7 @@ impl Config {
         if !(3..=12).contains(&f.edges) {
             return Err(Error::config("force.edges", "3 to 12 edges", f.edges));
         }
+        self.regrasp.validate()?;
         self.safety.validate()
     }
 }
@@ -364,7 +383,9 @@ mod tests {
         let config = Config::default();
         config.validate().unwrap();
         let json = serde_json::to_string(&config).unwrap();
-        assert_eq!(Config::from_json(&json).unwrap(), config);
+        // All of it is stated now, and stays.
+        let read = Config::from_json(&json).unwrap();
+        assert_eq!(Config { stated: 0, ..read }, config);
     }
 
     #[test]

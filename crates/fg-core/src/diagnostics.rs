@@ -4,8 +4,10 @@ use crate::gait::planner::GaitRate;
 use crate::gait::quality::Quality;
 use crate::gait::supervisor::{GaitEnd, Phase};
 use crate::manipulation::force::{ForceStatus, SolverCounters, SolverUsed};
+use crate::regrasp::phase as regrasp;
 use crate::safety::{Faults, SafeMode};
-use nalgebra::{DVector, Vector6};
+use crate::signals::Reference;
+use nalgebra::{DVector, Isometry3, Vector6};
 
 /// The figures of one control step. Allocated once, overwritten by each step; holds no time measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +16,12 @@ pub struct Diagnostics {
     pub phase: Phase,
     /// Finger whose gait is under way.
     pub free_finger: Option<usize>,
+    /// Phase of regrasping.
+    pub regrasp: regrasp::Phase,
+    /// Times that the object was set down.
+    pub set_downs: u64,
+    /// What the object is to do now: what is asked, less the turn that it missed while it lay. Its pose is in the log.
+    pub governed: Reference,
     /// Gaits begun since the start.
     pub gaits: u64,
     /// Why the last gait ended.
@@ -49,8 +57,8 @@ pub struct Diagnostics {
     pub status: ForceStatus,
     /// Who solved the QP.
     pub solver: SolverUsed,
-    /// KKT residual of the QP, N; certified up to `force.tolerance`, and taken as it is up to 100 times that where rounding
-    /// or an interior point allow no better.
+    /// KKT residual of the QP, N, of held forces too; certified up to `force.tolerance` times the largest force, and taken as
+    /// it is up to 100 times that where rounding or an interior point allow no better.
     pub kkt: f64,
     /// Iterations of the QP solver.
     pub iterations: usize,
@@ -73,6 +81,9 @@ impl Diagnostics {
         Self {
             phase: Phase::Hold,
             free_finger: None,
+            regrasp: regrasp::Phase::Idle,
+            set_downs: 0,
+            governed: Reference { X_WD: Isometry3::identity(), V_WD: Vector6::zeros() },
             gaits: 0,
             last_end: GaitEnd::None,
             quality: Quality::default(),
@@ -103,6 +114,10 @@ impl Diagnostics {
     fn visit(&self, mut show: impl FnMut(&'static str, &[f64])) {
         show("phase", &[f64::from(self.phase as u8)]);
         show("free_finger", &[self.free_finger.map_or(-1.0, |k| k as f64)]);
+        show("regrasp", &[f64::from(self.regrasp as u8)]);
+        show("set_downs", &[self.set_downs as f64]);
+        let (p, q) = (self.governed.X_WD.translation.vector, self.governed.X_WD.rotation.coords);
+        show("governed", &[p.x, p.y, p.z, q.w, q.x, q.y, q.z]);
         show("gaits", &[self.gaits as f64]);
         show("gait_end", &[f64::from(self.last_end as u8)]);
         show("Q", &[self.quality.Q]);

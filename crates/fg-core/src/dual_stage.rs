@@ -1,6 +1,7 @@
 //! The dual-stage planner: one control step from sensors to torques. The only file that knows the order.
 
 mod fallback;
+mod regrasping;
 mod report;
 
 use crate::config::Config;
@@ -18,6 +19,8 @@ use crate::manipulation::force::{ForceOptimizer, ForceProblem, ForceSettings, Fo
 use crate::manipulation::posture::Posture;
 use crate::manipulation::robust::{Controller, RobustController};
 use crate::manipulation::slip::{AdaptiveFriction, SlipDetector};
+use crate::regrasp::Regrasp;
+use crate::rules::{self, Scale};
 use crate::safety::guard::{Course, Guard, Plan};
 use crate::safety::limiter::TorqueLimiter;
 use crate::safety::steady::SteadyWrench;
@@ -28,6 +31,8 @@ use nalgebra::{DMatrix, DVector, Vector6};
 /// The whole controller. All memory is allocated in [`DualStagePlanner::new`].
 pub struct DualStagePlanner {
     hand: HandModel,
+    /// As it was given, and as it fits the grasp: [`rules`].
+    given: Config,
     config: Config,
     dt: f64,
     guard: Guard,
@@ -44,6 +49,7 @@ pub struct DualStagePlanner {
     pyramid: FrictionPyramid,
     planner: GaitPlanner,
     velocity_force: VelocityForceController,
+    regrasp: Regrasp,
     posture: Posture,
     /// Contact forces of the last step in their contact frames, N.
     f_prev: DVector<f64>,
@@ -60,6 +66,8 @@ pub struct DualStagePlanner {
     tau_free: Vec<f64>,
     steady: SteadyWrench,
     limiter: TorqueLimiter,
+    /// Some torque of the last step was at its limit.
+    at_limit: bool,
     /// Share of the torques that is left after one step in which nothing is held.
     fade: f64,
     command: Command,
@@ -123,7 +131,7 @@ impl DualStagePlanner {
             state: HandState::new(&hand),
             grasp: Grasp::new(&hand, config.gait.contact_force),
             quality: QualityModel::new(&hand, &config.gait),
-            supervisor: Supervisor::new(&hand, &config.gait, dt),
+            supervisor: Supervisor::new(&hand, &config.gaits(), dt),
             robust: RobustController::new(K, &config.robust, config.mass, &hand.gravity(), dt)?,
             forces: ForceOptimizer::new(&pyramids, n_q, settings.clone())?,
             probe: ForceOptimizer::new(&pyramids, n_q, settings)?,
@@ -131,6 +139,7 @@ impl DualStagePlanner {
             friction: AdaptiveFriction::new(&config.force, dt),
             pyramid,
             planner: GaitPlanner::new(&hand, &config.gait, dt),
+            regrasp: Regrasp::new(&hand, &config.regrasp, config.gait.change, dt),
             velocity_force: VelocityForceController::new(&config, dt),
             posture: Posture::new(&hand, &config.robust),
             f_prev: DVector::zeros(3 * n),
@@ -143,10 +152,12 @@ impl DualStagePlanner {
             tau_free: vec![0.0; hand.most_joints()],
             steady: SteadyWrench::new(dt),
             limiter: TorqueLimiter::new(limits, config.force.tau_rate_max, dt),
+            at_limit: false,
             fade: (-dt / config.safety.stop_time).exp(),
             command: Command { tau: DVector::zeros(n_q) },
             diagnostics,
             hand,
+            given: config.clone(),
             config,
         })
     }
@@ -156,7 +167,7 @@ impl DualStagePlanner {
         &self.hand
     }
 
-    /// The configuration in use.
+    /// The configuration in use, fitted to the grasp since the first.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -181,7 +192,10 @@ impl DualStagePlanner {
             free: self.supervisor.free_finger(),
             qd_des: (phase == Phase::Slide).then(|| self.planner.qd_des()),
             pressing: phase == Phase::Press,
+            open: (!self.controls()).then(|| self.regrasp.reach().qd_des()),
             grasped: self.supervisor.threshold().is_some(),
+            own: self.tau_own.as_slice(),
+            J: &self.grasp.J,
         };
         match self.guard.admit(&self.hand, &mut self.state, measurement, reference, &plan) {
             Course::Run => {
@@ -189,7 +203,10 @@ impl DualStagePlanner {
                 self.run(&measurement, &reference);
                 self.guard.put_back(measurement);
             }
-            Course::Stop => self.stop(),
+            Course::Stop => {
+                self.regrasp.lose();
+                self.stop();
+            }
             Course::Repeat => {}
         }
         self.diagnostics.faults = self.guard.faults();
@@ -200,7 +217,8 @@ impl DualStagePlanner {
     /// The step on a measurement that can be used.
     fn run(&mut self, measurement: &Measurement, reference: &Reference) {
         self.grasp.update(&self.hand, &self.state, measurement);
-        if !self.guard.allows_gaits() {
+        let reference = &self.regrasp(measurement, reference);
+        if !self.allows_gaits() {
             self.supervisor.abort();
         }
         self.supervise(measurement);
@@ -208,20 +226,22 @@ impl DualStagePlanner {
         let F_des = self.wrench(measurement, reference);
         self.bound_torques(measurement);
         self.weigh_wrench();
-        if self.guard.allows_gaits() {
+        self.judge_spares();
+        if self.allows_gaits() {
             self.choose_finger(measurement, &F_des);
         }
         self.optimise_forces(&F_des);
-        if !self.guard.blind() {
+        if !self.guard.blind() && self.controls() {
             self.robust.advance(&self.diagnostics.psi);
         }
         self.command.tau += &self.tau_own;
         self.drive_free_finger(measurement);
+        self.drive_arms();
         self.damp_fingers();
         self.test_motors();
-        let at_limit = self.limiter.apply(&mut self.command.tau);
+        self.at_limit = self.limiter.apply(&mut self.command.tau);
         self.diagnose(&F_des);
-        self.report(at_limit);
+        self.report();
     }
 
     /// Quality, first grasp, and the gait's phases.
@@ -248,6 +268,17 @@ impl DualStagePlanner {
             self.planner.reset();
             self.velocity_force.reset(self.grasp.contact(k).f_n);
         }
+        if first {
+            let scale = Scale::of(&self.grasp, self.robust.weight());
+            self.fit(rules::fitted(&self.given, &scale));
+        }
+    }
+
+    /// Takes the configuration that fits the grasp.
+    pub(super) fn fit(&mut self, config: Config) {
+        self.guard.fit(&config.safety);
+        self.planner.fit(&config.gait);
+        self.config = config;
     }
 
     /// Adapts the assumed friction to the slip of the fingers that hold the object.
@@ -256,9 +287,13 @@ impl DualStagePlanner {
         if self.guard.discontinuous() {
             self.slip.skip();
         }
-        let guard = &self.guard;
-        let holds = |j| Some(j) != free && guard.trusts(j) && guard.drives(j);
+        // Its filters start while a new grasp is checked, so that they have settled when it counts.
+        let (guard, settles) = (&self.guard, self.controls());
+        let holds = |j| settles && Some(j) != free && guard.trusts(j) && guard.drives(j);
         self.slip.update(&self.grasp, &self.state, self.guard.sensed_pose(), holds);
+        if !self.slip_tells() {
+            return;
+        }
         let fastest = self.slip.fastest(self.config.force.slip_speed);
         if self.friction.update(fastest) {
             self.assume_friction();
@@ -277,7 +312,7 @@ impl DualStagePlanner {
     }
 
     /// What the fingers fail to deliver, as a multiple of what a gait allows.
-    fn overload(&self, psi: &Vector6<f64>) -> f64 {
+    pub(super) fn overload(&self, psi: &Vector6<f64>) -> f64 {
         let gait = &self.config.gait;
         (linear(psi).norm() / gait.slack_force).max(angular(psi).norm() / gait.slack_torque)
     }
@@ -326,25 +361,30 @@ impl DualStagePlanner {
         let promises = |k| planner.potential(k, quality, &scene) > delta;
         let now = self.diagnostics.quality;
         let Some(k) = self.supervisor.candidate(&now, quality, &scene, promises) else { return };
-        self.f_limit.fill(self.config.force.f_n_max);
-        self.f_limit[k] = 0.0;
-        let scale = self.wrench_scale();
-        let F = F_des.component_mul(&scale);
-        let psi =
-            self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale));
-        if psi.is_ok_and(|psi| self.overload(&psi) <= 1.0) {
+        let psi = self.slack_without(k, F_des);
+        if psi.is_some_and(|psi| self.overload(&psi) <= 1.0) {
             self.supervisor.start(k, &self.grasp);
         } else {
             self.supervisor.refuse(k);
         }
     }
 
+    /// What the others fail to deliver of the wrench `F` without finger `k`; None where no solver says.
+    pub(super) fn slack_without(&mut self, k: usize, F: &Vector6<f64>) -> Option<Vector6<f64>> {
+        self.f_limit.fill(self.config.force.f_n_max);
+        self.f_limit[k] = 0.0;
+        let scale = self.wrench_scale();
+        let F = F.component_mul(&scale);
+        self.probe.solve(&force_problem!(self, F)).map(|solution| solution.psi.component_div(&scale)).ok()
+    }
+
     /// Eq. (8), with the free finger's force ramped or taken out.
     fn optimise_forces(&mut self, F_des: &Vector6<f64>) {
         for (j, limit) in self.f_limit.iter_mut().enumerate() {
-            let holds = self.guard.drives(j) && !self.guard.damps(j);
+            let open = self.regrasp.phase().is_open();
+            let holds = self.guard.drives(j) && !self.guard.damps(j) && !open;
             *limit = if holds { self.supervisor.force_limit(j, self.config.force.f_n_max) } else { 0.0 };
-            self.f_prev[3 * j + 2] += self.guard.squeeze();
+            self.f_prev[3 * j + 2] += self.guard.squeeze() + self.regrasp.squeeze();
         }
         let scale = self.wrench_scale();
         let F = F_des.component_mul(&scale);

@@ -37,6 +37,8 @@ pub mod gait;
 pub mod grasp;
 pub mod hand;
 pub mod manipulation;
+pub mod regrasp;
+pub mod rules;
 pub mod safety;
 pub mod signals;
 pub mod solver;

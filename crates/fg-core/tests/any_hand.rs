@@ -148,7 +148,8 @@ fn gaits_run_on_hands_with_few_and_many_joints() {
     let mut random = Random(3);
     for _ in 0..60 {
         let (hand, ..) = hand(&mut random);
-        let mut config = Config { mass: Some(0.01), ..Config::default() };
+        let mut config = Config::default();
+        config.mass = Some(0.01);
         config.force.tau_max = Some(1.0);
         // Every grasp is to be mended, by any finger, whether it helps or not: all that is asked is that it runs.
         (config.gait.threshold_margin, config.gait.delta) = (-1e3, -1e3);

@@ -206,8 +206,11 @@ fn a_finger_without_angles_or_contact_is_damped() {
     assert_eq!(replay.mode(), SafeMode::Damp);
     let f = &replay.planner.diagnostics().f;
     assert_eq!(f.rows(0, 3).amax(), 0.0);
+    // The reference has stood since the sensor was missed, and the recorded object has not: torques saturate.
     replay.run(BEGIN + 200..BEGIN + 200 + RECOVERY, |_, _, _| ());
-    assert_eq!(replay.mode(), SafeMode::Normal);
+    assert!(
+        replay.mode() <= SafeMode::Hold && !replay.has(Fault::Encoder) && !replay.has(Fault::TactileLost)
+    );
 }
 
 #[test]
@@ -291,4 +294,70 @@ fn a_tactile_place_off_the_fingertip_is_replaced_by_the_last_one() {
     for place in [Vector3::new(1.0, 0.0, 0.0), Vector3::zeros(), Vector3::repeat(1e200)] {
         Replay::under_way().suffers(Fault::Tactile, SafeMode::Hold, 0, |_, m, _| m.tactile[2].p_FC = place);
     }
+}
+
+#[test]
+fn reads_that_fail_now_and_then_are_replaced_and_change_nothing_else() {
+    let mut replay = Replay::under_way();
+    let gaits = replay.planner.diagnostics().gaits;
+    for k in BEGIN..BEGIN + 1200 {
+        // Every fifth read, and four in a row now and then.
+        let fails = k % 5 == 0 || k % 100 < 4;
+        replay.run(k..k + 1, |_, m, _| {
+            if fails {
+                m.q.fill(0.0);
+            }
+        });
+        assert_eq!(replay.has(Fault::Encoder), fails, "step {k}");
+        assert_eq!(replay.mode(), SafeMode::Normal, "step {k}");
+    }
+    assert!(replay.planner.diagnostics().gaits > gaits);
+    // One that fails for good does.
+    replay.run(BEGIN + 1201..BEGIN + 1221, |_, m, _| m.q.fill(0.0));
+    assert!(replay.has(Fault::Encoder) && replay.mode() >= SafeMode::Hold);
+}
+
+#[test]
+fn forces_in_another_unit_contradict_the_joint_torques() {
+    for factor in [0.1, 102.0] {
+        let mut replay = Replay::new(|_| ());
+        replay.run(0..1000, |_, m, _| m.tactile.iter_mut().for_each(|reading| reading.f_n *= factor));
+        assert!(replay.has(Fault::TactileScale), "{factor}: {:?}", replay.planner.diagnostics().faults);
+        assert!(replay.mode() >= SafeMode::Hold);
+    }
+    // Without torque sensors there is nothing to compare with.
+    let mut replay = Replay::new(|config| config.safety.motor_asked = 1.0);
+    replay.run(0..400, |_, m, _| {
+        m.tau.fill(0.0);
+        for reading in &mut m.tactile {
+            reading.f_n *= 3.0;
+        }
+    });
+    assert!(!replay.has(Fault::TactileScale));
+}
+
+#[test]
+fn a_start_that_does_not_fit_the_touching_tips_drives_nothing_until_it_does() {
+    let shift =
+        |x: &mut Isometry3<f64>, by: f64| x.translation.vector += Vector3::new(0.6 * by, -0.8 * by, 0.0);
+    for by in [0.06, 0.1, 0.5] {
+        let mut replay = Replay::new(|_| ());
+        replay.run(0..100, |_, m, r| {
+            shift(&mut m.X_WO, by);
+            shift(&mut r.X_WD, by);
+        });
+        assert!(replay.has(Fault::PoseFrame) && replay.mode() == SafeMode::Stop);
+        assert!(replay.tau.amax() < 0.05, "{by}: {}", replay.tau);
+        replay.run(100..200, |_, _, _| ());
+        assert!(!replay.has(Fault::PoseFrame) && replay.mode() == SafeMode::Normal, "{by}");
+    }
+    let mut replay = Replay::new(|_| ());
+    replay.run(0..100, |_, m, r| {
+        shift(&mut m.X_WO, 0.03);
+        shift(&mut r.X_WD, 0.03);
+    });
+    assert!(replay.planner.diagnostics().faults.is_empty() && replay.mode() == SafeMode::Normal);
+    let mut replay = Replay::new(|_| ());
+    replay.run(0..100, |_, m, _| m.tactile.iter_mut().for_each(|reading| reading.p_FC = reading.p_FC.yxz()));
+    assert!(replay.has(Fault::TactileAxes) && replay.mode() == SafeMode::Stop);
 }

@@ -10,6 +10,7 @@ mod recording;
 mod replay;
 
 use fg_core::error::Error;
+use fg_core::regrasp::config::Change;
 use fg_core::safety::config::SafetyConfig;
 use fg_core::safety::reference::ReferenceGuard;
 use fg_core::safety::{Fault, Faults, SafeMode};
@@ -269,8 +270,9 @@ fn no_order_of_calls_panics() {
 
 #[test]
 fn an_overdue_grasp_makes_the_desired_motion_stand() {
-    // No finger is ever free to go: any slack at all is too much.
+    // No finger is ever free to go: any slack at all is too much. Nor may the object be set down.
     let mut replay = Replay::new(|config| {
+        config.gait.change = Change::Gait;
         config.gait.slack_force = 1e-9;
         config.gait.slack_torque = 1e-9;
         config.gait.overdue_margin = 0.0;

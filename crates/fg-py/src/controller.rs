@@ -7,7 +7,20 @@ use nalgebra::Vector6;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike2};
 use pyo3::prelude::*;
 
-/// A robust controller read from a controller artefact (JSON text).
+/// A robust controller K, eqs. (6) and (7), from the JSON text of a controller artefact.
+///
+/// K maps the pose error e = [p_D - p_O; log(R_D R_O^T)] in W, m and rad, to an acceleration u, m/s^2 and rad/s^2. The
+/// format is in ARCHITECTURE.md ("Controller artefact"); `fingergait synthesize` writes such files.
+///
+/// Parameters
+/// ----------
+/// artefact
+///     JSON text.
+///
+/// Raises
+/// ------
+/// ArtifactError
+///     A field that is missing, unknown, of the wrong size or not finite; names it.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct Controller(pub Core);
 
@@ -18,32 +31,42 @@ impl Controller {
         Core::from_json(artefact).map(Self).map_err(to_py)
     }
 
+    /// "mu-synthesis" or "hand-tuned".
     #[getter]
     fn kind(&self) -> &str {
         &self.0.kind
     }
 
+    /// The artefact's line for people.
     #[getter]
     fn description(&self) -> &str {
         &self.0.description
     }
 
+    /// Sample time that K was discretised for, s; the control rate has to fit.
     #[getter]
     fn sample_time(&self) -> f64 {
         self.0.sample_time
     }
 
+    /// Nominal mass of the object, kg, that K was designed with.
     #[getter]
     fn mass(&self) -> f64 {
         self.0.nominal.mass
     }
 
+    /// Nominal principal moments of inertia (3,), kg m^2, that K was designed with.
     #[getter]
     fn inertia<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, &self.0.nominal.inertia)
     }
 
-    /// Open-loop response u (T, 6) of K from rest to the error sequence e (T, 6), without saturation.
+    /// Open-loop response u (T, 6), m/s^2 and rad/s^2, of K from rest to errors e (T, 6), m and rad, unsaturated.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If e has another shape.
     fn simulate<'py>(
         &self,
         py: Python<'py>,

@@ -25,8 +25,9 @@ fn tree(py: Python<'_>) -> PyResult<&Tree> {
             Ok(class.cast_into::<PyType>()?.unbind())
         };
         let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
-        let base =
-            class("FingergaitError", exception, "Base of every error that fingergait raises on purpose.")?;
+        let doc = "Base of every error that fingergait raises on purpose: \
+                   names the field, what was expected and found.";
+        let base = class("FingergaitError", exception, doc)?;
         // Each is a ValueError too, so that generic callers catch it as what it is.
         let leaf = |name, doc| {
             let bases = PyTuple::new(py, [base.bind(py).clone(), py.get_type::<PyValueError>()])?;

@@ -8,7 +8,20 @@ use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayDyn, PyArrayLike1, PyArr
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 
-/// Kinematics of a hand, from the JSON that `fingergait.hand` derives from an MJCF.
+/// Kinematics and weight of a hand, from its JSON text.
+///
+/// Two to six fingers of one to seven independent joints each, fixed in W. The text's format is in ARCHITECTURE.md
+/// ("Hand model"); `fingergait.hand_json` makes it from an MJCF or URDF.
+///
+/// Parameters
+/// ----------
+/// spec
+///     JSON text; lengths in m, masses in kg, angles in rad, quaternions wxyz.
+///
+/// Raises
+/// ------
+/// ConfigError
+///     A field that is missing, unknown, not finite or out of range; names it.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct HandModel(pub Core);
 
@@ -46,18 +59,19 @@ impl HandModel {
         Core::from_json(spec).map(Self).map_err(to_py)
     }
 
+    /// Number of fingers.
     #[getter]
     fn n_fingers(&self) -> usize {
         self.0.n_fingers()
     }
 
-    /// Independent joints of all fingers.
+    /// Independent joints of all fingers: those that follow no other.
     #[getter]
     fn n_q(&self) -> usize {
         self.0.n_q()
     }
 
-    /// Independent joints of one finger: a number where all have as many, else one number for each finger.
+    /// Independent joints of one finger: an int where all fingers have as many, else a list of one for each.
     #[getter]
     fn n_joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let counts = self.0.counts();
@@ -68,6 +82,11 @@ impl HandModel {
     }
 
     /// Where the independent joints of `finger` are in a flat array (n_q,).
+    ///
+    /// Raises
+    /// ------
+    /// ConfigError
+    ///     If there is no such finger.
     fn joints<'py>(&self, py: Python<'py>, finger: usize) -> PyResult<Bound<'py, PySlice>> {
         self.check(finger)?;
         let range = self.0.joints(finger);
@@ -75,7 +94,7 @@ impl HandModel {
         Ok(PySlice::new(py, end(range.start), end(range.end), 1))
     }
 
-    /// Lower and upper limits of the independent joints, rad.
+    /// Lower and upper limits, rad, narrowed so that joints that follow stay in theirs; shapes as of `tau_min`.
     #[getter]
     #[allow(clippy::type_complexity, reason = "two arrays")]
     fn limits<'py>(
@@ -85,19 +104,20 @@ impl HandModel {
         Ok((self.each(py, |joint| joint.lower)?, self.each(py, |joint| joint.upper)?))
     }
 
-    /// Least torques that the model states, N m; NaN where it states none.
+    /// Least torques that the model states, N m, NaN where it states none: (n_fingers, n_joints) where all fingers
+    /// have as many joints, else (n_q,). So are all arrays over the joints; (n_q,) is always taken.
     #[getter]
     fn tau_min<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         self.each(py, |joint| joint.tau_min.unwrap_or(f64::NAN))
     }
 
-    /// Largest torques that the model states, N m; NaN where it states none.
+    /// Largest torques that the model states, N m, NaN where it states none; shape as of `tau_min`.
     #[getter]
     fn tau_max<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         self.each(py, |joint| joint.tau_max.unwrap_or(f64::NAN))
     }
 
-    /// The posture that the joints should return to, rad.
+    /// The posture that the joints should return to, rad; shape as of `tau_min`.
     #[getter]
     fn reference<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         self.each(py, |joint| joint.reference)
@@ -109,7 +129,12 @@ impl HandModel {
         array1(py, self.0.gravity().as_slice())
     }
 
-    /// Centres of the fingertips in W, (n_fingers, 3), at joint angles q.
+    /// Centres of the fingertips in W, (n_fingers, 3), m, at joint angles q, rad, shaped as `tau_min`.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If q has another number of joints.
     fn tip_positions<'py>(
         &self,
         py: Python<'py>,
@@ -120,7 +145,23 @@ impl HandModel {
         Ok(array2(py, (n, 3), |j, r| state.tip(j).translation.vector[r]))
     }
 
-    /// Velocity Jacobian (3, n_joints) in W of the point of the last link now at `point` (3,) in W.
+    /// Velocity Jacobian in W of a point of a finger's last link, (3, joints of the finger), m/rad: v = J qd.
+    ///
+    /// Parameters
+    /// ----------
+    /// q
+    ///     Joint angles, rad, shaped as `tau_min`.
+    /// finger
+    ///     Index of the finger.
+    /// point
+    ///     Where the point is now, (3,) in W, m.
+    ///
+    /// Raises
+    /// ------
+    /// ConfigError
+    ///     If there is no such finger.
+    /// ShapeError
+    ///     If q or point has another shape.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -134,7 +175,12 @@ impl HandModel {
         Ok(array2(py, J.shape(), |r, c| J[(r, c)]))
     }
 
-    /// Torques that hold the fingers' own weight, N m.
+    /// Torques, N m, that hold the fingers' own weight at joint angles q, rad; both shaped as `tau_min`.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If q has another number of joints.
     fn gravity_torque<'py>(
         &self,
         py: Python<'py>,

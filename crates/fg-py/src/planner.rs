@@ -10,6 +10,7 @@ use fg_core::diagnostics::Diagnostics as CoreDiagnostics;
 use fg_core::dual_stage::DualStagePlanner as Core;
 use fg_core::error::Error;
 use fg_core::hand::HandModel as CoreHand;
+use fg_core::regrasp::phase::Phase as RegraspPhase;
 use fg_core::signals::{Measurement as CoreMeasurement, Reference as CoreReference, Tactile};
 use nalgebra::{DVector, Vector3, Vector6};
 use numpy::{
@@ -18,7 +19,26 @@ use numpy::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// What the sensors say at one instant: no velocity, no mass, no mesh.
+/// What the sensors say at one instant. No velocity, mass, friction or mesh: there is no field for them.
+///
+/// Parameters
+/// ----------
+/// t
+///     Time, s.
+/// q, tau
+///     Joint angles, rad, and measured joint torques, N m, each (n_fingers, n_joints) where all fingers have as many
+///     joints, or (n_q,).
+/// pose
+///     Pose (7,) of the object O in W: position, m, and quaternion wxyz. NaN says that none was seen.
+/// contact_place
+///     Where each tip is touched, (n_fingers, 3), m, in its fingertip frame F; anything where it is not.
+/// contact_force
+///     Force along each tip's normal, (n_fingers,), N; zero without contact.
+///
+/// Raises
+/// ------
+/// ShapeError
+///     Arrays whose shapes do not fit each other. Numbers that are not finite are no error: the step judges them.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct Measurement(CoreMeasurement);
 
@@ -57,7 +77,21 @@ impl Measurement {
     }
 }
 
-/// Desired object pose (7,) in W, with the desired twist (6,) [linear; angular] in W, zero by default.
+/// The desired motion of the object at one instant.
+///
+/// Parameters
+/// ----------
+/// pose
+///     Desired pose (7,) of the object in W: position, m, and quaternion wxyz.
+/// twist
+///     Desired twist (6,), [linear; angular] in W, m/s and rad/s; zero where it is absent.
+///
+/// Raises
+/// ------
+/// ShapeError
+///     If an array has another length.
+/// ConfigError
+///     If the quaternion is far from a unit one.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct Reference(CoreReference);
 
@@ -86,7 +120,8 @@ pub struct Command {
 
 #[pymethods]
 impl Command {
-    /// Desired joint torques, N m: (n_fingers, n_joints) where all fingers have as many joints, else (n_q,).
+    /// Desired joint torques, N m: (n_fingers, n_joints) where all fingers have as many joints, else (n_q,). Finite
+    /// and within the limits, whatever was measured.
     #[getter]
     fn tau<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         joint_array(py, &self.counts, self.tau.as_slice())
@@ -100,7 +135,9 @@ enum Counts {
     Each(Vec<usize>),
 }
 
-/// What the step decided and why.
+/// What a control step decided, and why.
+///
+/// `row` and `columns` have all figures; the properties are those that programs ask for most.
 #[pyclass(frozen, module = "fingergait._core")]
 pub struct Diagnostics {
     core: CoreDiagnostics,
@@ -110,7 +147,7 @@ pub struct Diagnostics {
 
 #[pymethods]
 impl Diagnostics {
-    /// "hold" or "gait".
+    /// "gait" while a finger is on its way, else "hold".
     #[getter]
     fn mode(&self) -> &'static str {
         if self.core.free_finger.is_some() {
@@ -126,19 +163,38 @@ impl Diagnostics {
         self.core.phase.as_str()
     }
 
-    /// Index of the finger whose gait is under way.
+    /// Phase of regrasping: "idle" until it begins, then "turn", "brake", "lower", and so on.
+    #[getter]
+    fn regrasp(&self) -> &'static str {
+        self.core.regrasp.as_str()
+    }
+
+    /// Names of the phases of regrasping: that of number k is k in the column `regrasp` of a log.
+    #[staticmethod]
+    fn regrasp_phase_names() -> Vec<&'static str> {
+        RegraspPhase::ALL.iter().map(|phase| phase.as_str()).collect()
+    }
+
+    /// Pose (7,) in W that the object is to have now: what is asked, less what was missed while it lay.
+    #[getter]
+    fn governed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let (p, q) = (self.core.governed.X_WD.translation.vector, self.core.governed.X_WD.rotation.coords);
+        array1(py, &[p.x, p.y, p.z, q.w, q.x, q.y, q.z])
+    }
+
+    /// Index of the finger whose gait is under way; None while all hold.
     #[getter]
     fn free_finger(&self) -> Option<usize> {
         self.core.free_finger
     }
 
-    /// Whether the force optimum is certified: "solved" or "held".
+    /// Whether the contact forces, eq. (8), are certified optimal: "solved", else "held".
     #[getter]
     fn status(&self) -> &'static str {
         self.core.status.as_str()
     }
 
-    /// Who solved the force QP.
+    /// Who found the contact forces: "active_set", "clarabel_polished", "clarabel" or "held".
     #[getter]
     fn solver(&self) -> &'static str {
         self.core.solver.as_str()
@@ -154,7 +210,7 @@ impl Diagnostics {
         Ok(counts)
     }
 
-    /// How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop".
+    /// How the hand was driven: "normal", "hold", "squeeze", "damp" or "stop", see docs/safety.md.
     #[getter]
     fn safe_mode(&self) -> &'static str {
         self.core.safe_mode.as_str()
@@ -166,7 +222,19 @@ impl Diagnostics {
         self.core.faults.iter().map(fg_core::safety::Fault::as_str).collect()
     }
 
-    /// Grasp quality Q, eq. (1).
+    /// Names of all faults: that of number k is bit k of the column `faults` of a log.
+    #[staticmethod]
+    fn fault_names() -> Vec<&'static str> {
+        fg_core::safety::Fault::ALL.iter().map(|fault| fault.as_str()).collect()
+    }
+
+    /// Names of all modes, from the mildest on: that of number k is k in the column `safe_mode` of a log.
+    #[staticmethod]
+    fn safe_mode_names() -> Vec<&'static str> {
+        fg_core::safety::SafeMode::ALL.iter().map(|mode| mode.as_str()).collect()
+    }
+
+    /// Grasp quality Q, eq. (1), dimensionless.
     #[getter]
     fn quality(&self) -> f64 {
         self.core.quality.Q
@@ -203,7 +271,7 @@ impl Diagnostics {
         Ok(CoreDiagnostics::columns(&counts))
     }
 
-    /// Every figure of this step as one row, for a log. Deterministic: holds no time measurement.
+    /// Every figure of this step as one row, for a log: SI units. Deterministic, holds no time measurement.
     fn row<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let mut row = Vec::with_capacity(128);
         self.core.row(&mut row);
@@ -211,7 +279,23 @@ impl Diagnostics {
     }
 }
 
-/// The whole control step: grasp quality, gait planner, robust controller, force optimiser.
+/// The whole control step, Section II: grasp quality, gait planner, robust controller, force optimiser.
+///
+/// Parameters
+/// ----------
+/// hand
+///     The hand.
+/// controller
+///     K, for the configured control rate.
+/// config
+///     JSON text of a `Config`; fields that are absent keep their defaults, see `default_config`.
+///
+/// Raises
+/// ------
+/// ConfigError
+///     A field that is unknown or out of range; names it, what was expected and what was found.
+/// ArtifactError
+///     A controller for another control rate.
 #[pyclass(module = "fingergait._core")]
 pub struct DualStagePlanner(Core);
 
@@ -224,13 +308,21 @@ impl DualStagePlanner {
         Core::new(hand.0.clone(), controller.0.clone(), config).map(Self).map_err(to_py)
     }
 
-    /// The configuration in use.
+    /// The configuration in use, with every default filled in.
     #[getter]
     fn config<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         config_dict(py, self.0.config())
     }
 
     /// The torques to track until the next step, and what was decided.
+    ///
+    /// Call it once a control period. It allocates nothing on its fast path and releases the GIL. Faults of sensors,
+    /// clock and solvers are no errors: they are in the diagnostics, and the command is safe.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If the measurement is of another hand; nothing has changed then.
     fn step(
         &mut self,
         py: Python<'_>,
@@ -256,7 +348,9 @@ impl DualStagePlanner {
     }
 }
 
-/// The default `Config`: the paper's parameter list.
+/// The default `Config`: the paper's parameters, Section V-B; each departure is documented in `fg_core::config`.
+///
+/// A dictionary of plain values; changed and passed through `json.dumps`, it is the `config` of a `DualStagePlanner`.
 #[pyfunction]
 pub fn default_config(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     config_dict(py, &Config::default())

@@ -45,7 +45,26 @@ fn numbers<const N: usize>(field: &str, array: &ArrayLike<'_>) -> PyResult<[f64;
     Ok(numbers)
 }
 
-/// The force optimisation QP, eq. (8).
+/// The force optimisation QP, eq. (8), with a certificate on each answer.
+///
+///     min  alpha_1 |f|^2 + alpha_2 |f - f_prev|^2 + alpha_3 |Psi|^2
+///     with Psi = F_des - G f, f in the friction pyramids, tau_min <= J^T f <= tau_max
+///
+/// Parameters
+/// ----------
+/// edges
+///     Pyramid edges (n, 3, m) of each contact in its contact frame, z along the normal into the object; m 3 to 12.
+/// alpha
+///     The three weights (3,). In Psi, torques count over a length, `force.torque_length` of the configuration.
+/// solver
+///     "active_set", with clarabel where its answer is not certified, or "clarabel".
+///
+/// Raises
+/// ------
+/// ConfigError
+///     Edges that span no pyramid, weights out of range, or an unknown solver.
+/// ShapeError
+///     If an array has another shape.
 #[pyclass(module = "fingergait._core")]
 pub struct ForceOptimizer {
     pyramids: Vec<FrictionPyramid>,
@@ -83,6 +102,29 @@ impl ForceOptimizer {
         Ok(Self { pyramids, settings, core, n_q })
     }
 
+    /// The best contact forces for a wrench; warm-started from the call before.
+    ///
+    /// Parameters
+    /// ----------
+    /// G
+    ///     Grasp map (6, 3n): the wrench on the object at Oo in W is G f.
+    /// J
+    ///     Hand Jacobian (3n, n_q), with tau = J^T f.
+    /// F_des
+    ///     Wrench asked for, (6,), N and N m, in W.
+    /// f_prev
+    ///     Contact forces of the step before, (3n,), N.
+    /// tau_min, tau_max
+    ///     Torque limits (n_q,), N m.
+    /// f_normal_max
+    ///     Largest normal forces (n,), N; zero takes a finger out. Absent: no limit.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If an array has another shape.
+    /// ConfigError
+    ///     A number that is not finite, or limits that exclude zero torque.
     #[pyo3(signature = (G, J, F_des, f_prev, tau_min, tau_max, f_normal_max = None))]
     #[allow(clippy::too_many_arguments)] // the Python signature
     fn solve(
@@ -132,7 +174,7 @@ impl ForceOptimizer {
     }
 }
 
-/// Contact forces, torques and how good they are.
+/// Contact forces, torques and how good they are: the answer of `ForceOptimizer.solve`.
 #[pyclass(module = "fingergait._core", frozen)]
 pub struct ForceSolution {
     core: force::ForceSolution,
@@ -142,32 +184,33 @@ pub struct ForceSolution {
 
 #[pymethods]
 impl ForceSolution {
-    /// Contact forces (3n,), N, in the contact frames.
+    /// Contact forces (3n,), N, each in its contact frame.
     #[getter]
     fn f<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.core.f.as_slice())
     }
-    /// Torques (n_q,), N m.
+    /// Joint torques J^T f, (n_q,), N m.
     #[getter]
     fn tau<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.core.tau.as_slice())
     }
-    /// Wrench (6,) that is not delivered.
+    /// Wrench (6,) that is not delivered: Psi = F_des - G f, N and N m, in W.
     #[getter]
     fn psi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, self.core.psi.as_slice())
     }
-    /// "solved" or "held".
+    /// Whether the forces are certified optimal: "solved", else "held": the last ones, made feasible.
     #[getter]
     fn status(&self) -> &'static str {
         self.core.status.as_str()
     }
-    /// "active_set", "clarabel_polished", "clarabel" or "held".
+    /// Who found them: "active_set", "clarabel_polished", "clarabel" or "held".
     #[getter]
     fn solver(&self) -> &'static str {
         self.core.solver.as_str()
     }
-    /// KKT residual, N; for held forces their worst violation of a bound.
+    /// Residual of the optimality (KKT) conditions, N; of held forces too, then never zero: their worst violation
+    /// of a bound or their distance from a minimiser, whichever is larger.
     #[getter]
     fn kkt(&self) -> f64 {
         self.core.kkt
@@ -184,7 +227,7 @@ impl ForceSolution {
     }
 }
 
-/// Joint velocities and what they reach.
+/// The answer of `gait_lp`.
 #[pyclass(module = "fingergait._core", frozen)]
 pub struct LpSolution {
     x: Vec<f64>,
@@ -193,12 +236,12 @@ pub struct LpSolution {
 
 #[pymethods]
 impl LpSolution {
-    /// The maximiser.
+    /// The maximiser (n,); zero where there is none.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         array1(py, &self.x)
     }
-    /// c . x.
+    /// The value c . x reached.
     #[getter]
     fn value(&self) -> f64 {
         self.outcome.value
@@ -210,7 +253,22 @@ impl LpSolution {
     }
 }
 
-/// max c.x subject to a.x = 0 and lower <= x <= upper, exactly, eq. (4).
+/// The gait LP, eq. (4): max c . x subject to a . x = 0 and lower <= x <= upper, solved exactly.
+///
+/// In the planner x is the free finger's joint velocity, rad/s, c the quality's rate coefficients (3), and a the
+/// surface's normal through the Jacobian (4c).
+///
+/// Parameters
+/// ----------
+/// c, a, lower, upper
+///     Vectors (n,), all of one length.
+///
+/// Raises
+/// ------
+/// ShapeError
+///     If the lengths differ.
+/// ConfigError
+///     A number that is not finite, or a lower bound above its upper one.
 #[pyfunction]
 pub fn gait_lp(
     c: ArrayLike<'_>,

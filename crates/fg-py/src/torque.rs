@@ -9,7 +9,27 @@ use fg_core::torque::TorquePid as Core;
 use numpy::{AllowTypeChange, PyArrayDyn, PyArrayLikeDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-/// Joint torque tracking at the faster torque rate.
+/// Joint torque tracking at the faster torque rate, Section II: PID with feedforward and anti-windup.
+///
+/// Parameters
+/// ----------
+/// n_joints_total
+///     Joints of the whole hand.
+/// dt
+///     Period of the torque loop, s.
+/// config
+///     JSON text of a `Config`, of which `torque` and `force` count; absent: the defaults, and for joints without
+///     limits the 0.5 N m of the paper's hand.
+/// tau_min, tau_max
+///     Torque limits (n_joints_total,) in any shape, N m, neither beyond `force.tau_max` of `config`, which is the
+///     limit where they are absent.
+///
+/// Raises
+/// ------
+/// ConfigError
+///     A field that is unknown or out of range, or a joint without limits.
+/// ShapeError
+///     If the limits are of another number of joints.
 #[pyclass(module = "fingergait._core")]
 pub struct TorquePid {
     core: Core,
@@ -39,7 +59,12 @@ impl TorquePid {
         Ok(Self { core, motor: vec![0.0; n_joints_total] })
     }
 
-    /// Motor torques that drive the measured torques `tau` to `tau_des`; same shape as `tau_des`.
+    /// Motor torques, N m, that drive the measured torques `tau` to `tau_des`; all three of the same shape.
+    ///
+    /// Raises
+    /// ------
+    /// ShapeError
+    ///     If an array has another number of joints.
     fn step<'py>(
         &mut self,
         py: Python<'py>,

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fingergait.bench.measure import Sample, measure
+from fingergait.files import make_folder, whole_file, write_text
 from fingergait.paths import MODELS
 
 REFERENCE = MODELS / "bench" / "reference.json"
@@ -22,6 +23,7 @@ SLOWER = 1.5  # ratio to the reference above which a row counts as changed
 
 def run_bench(out: Path, quick: bool, console: Console) -> dict[str, Any]:
     """Measures, prints to `console`, writes `bench.json` and `latency.png` to `out`; gives what `bench.json` says."""
+    make_folder(out)
     samples = measure(3.0, 1, 1) if quick else measure()
     rows = [sample.row(name) for name, sample in sorted(samples.items())]
     slower = changed(rows)
@@ -29,8 +31,7 @@ def run_bench(out: Path, quick: bool, console: Console) -> dict[str, Any]:
     console.print(table(rows))
     for name, ratio in slower.items():
         console.print(f"[red]{name}: {ratio:.2f} times the reference")
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "bench.json").write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    write_text(out / "bench.json", json.dumps(result, indent=2) + "\n")
     plot(samples, out / "latency.png")
     return result
 
@@ -92,4 +93,5 @@ def plot(samples: dict[str, Sample], path: Path) -> None:
     axes.set_ylabel("share of steps that took longer")
     axes.grid(True, which="both", alpha=0.3)
     axes.legend()
-    figure.savefig(path, dpi=150)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=150)

@@ -13,6 +13,7 @@ from distributed.client import Future
 
 from fingergait._core import ConfigError, FingergaitError
 from fingergait.campaign.trial import METRICS, OBSERVED, Outcome, Trial, run_trial
+from fingergait.stopping import shielded
 
 _CONNECT_S = 10.0
 _ATTEMPTS = 3  # times that a run is handed in again after the scheduler lost it
@@ -33,7 +34,8 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         os.environ.setdefault(name, "1")
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout=_CONNECT_S)
+            with shielded():
+                client = Client(scheduler, timeout=_CONNECT_S)
         except (OSError, TimeoutError, ValueError) as error:
             found = " ".join(str(error).split()) or type(error).__name__
             raise ConfigError(f"--scheduler: expected a dask scheduler at {scheduler}, found none ({found})") from None
@@ -47,13 +49,14 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Client]:
         "distributed.admin.tick.limit": "60s",
     }
     with dask.config.set(settings):
-        cluster = LocalCluster(
-            n_workers=workers or default_workers(),
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            silence_logs=logging.CRITICAL,
-        )
+        with shielded():
+            cluster = LocalCluster(
+                n_workers=workers or default_workers(),
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                silence_logs=logging.CRITICAL,
+            )
         with cluster, Client(cluster) as client:
             yield client
 

@@ -1,7 +1,7 @@
 """The work of `fingergait campaign`: sample, run, keep, judge, report."""
 
+import contextlib
 import json
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
+
+from distributed import Client
 
 from fingergait._core import ConfigError, DualStagePlanner, HandModel
 from fingergait.campaign.build import build_id
@@ -20,12 +22,14 @@ from fingergait.campaign.report import write_campaign_page
 from fingergait.campaign.sampling import Sample, Sampler
 from fingergait.campaign.spec import CampaignSpec
 from fingergait.campaign.statistics import summary
-from fingergait.campaign.store import Store, row_schema, write_atomic
+from fingergait.campaign.store import Store, row_schema
 from fingergait.campaign.trial import Outcome, Trial
+from fingergait.files import write_text
 from fingergait.hand import hand_json
 from fingergait.paths import find
 from fingergait.run.simulate import load_controller, versions
 from fingergait.sim.plant import MujocoPlant
+from fingergait.stopping import Stopped
 
 _CHECKED = 64  # samples whose values are checked before anything runs
 
@@ -53,15 +57,24 @@ def run_campaign(spec: CampaignSpec, options: Options) -> dict[str, Any]:
     _try_out(sampler, first[0] if first else None)
     total = spec.samples if spec.method != "grid" else sum(1 for _ in sampler)
     folder = options.out if options.out is not None else Path("runs") / f"campaign-{spec.name}"
-    store = Store(folder, _manifest(spec, sampler), row_schema(sampler.columns), options.resume)
-    done = store.done()
-    seen = Counter(store.rows().column("status").to_pylist())
-    begin = time.perf_counter()
-    if len(done) < total:
-        _run(spec, sampler, store, options, done, CampaignProgress(spec.name, total, seen))
-    else:
-        for _ in sampler:  # counts the points passed over
-            pass
+    with contextlib.ExitStack() as stack:
+        # A scheduler that isn't there must not cost the folder.
+        client = None if options.scheduler is None else stack.enter_context(connect(options.scheduler, None))
+        store = Store(folder, _manifest(spec, sampler), row_schema(sampler.columns), options.resume)
+        done = store.done()
+        seen = Counter(store.rows().column("status").to_pylist())
+        begin = time.perf_counter()
+        if len(done) < total:
+            try:
+                if client is None:
+                    client = stack.enter_context(connect(None, options.workers))
+                _run(spec, sampler, store, client, done, CampaignProgress(spec.name, total, seen))
+            except Stopped as stop:
+                kept = f"{len(store.done())} of {total} runs are kept; --resume --out {folder} goes on"
+                raise Stopped(kept, stop.status - 128) from None
+        else:
+            for _ in sampler:  # counts the points passed over
+                pass
     seconds = time.perf_counter() - begin
     rows = store.finish()
     figures = {"campaign": spec.name, **summary(rows, spec.limits), "skipped": sampler.skipped}
@@ -69,12 +82,12 @@ def run_campaign(spec: CampaignSpec, options: Options) -> dict[str, Any]:
     figures["versions"] = versions()
     figures["data"], figures["report"] = str(folder / "data"), str(folder / "report.html")
     write_campaign_page(spec, rows, store.timings(), figures, folder / "report.html")
-    write_atomic(folder / "summary.json", json.dumps(figures, indent=2) + "\n")
+    write_text(folder / "summary.json", json.dumps(figures, indent=2) + "\n")
     return figures
 
 
 def _run(
-    spec: CampaignSpec, sampler: Sampler, store: Store, options: Options, done: set[int], progress: CampaignProgress
+    spec: CampaignSpec, sampler: Sampler, store: Store, client: Client, done: set[int], progress: CampaignProgress
 ) -> None:
     pending: dict[int, Sample] = {}
     base = sampler.base.model_dump(mode="json", exclude_unset=True)
@@ -91,12 +104,8 @@ def _run(
         store.add(rows, [{"index": outcome.index, **outcome.timing} for outcome in outcomes])
         progress.add([row["status"] for row in rows])
 
-    try:
-        with connect(options.scheduler, options.workers) as client, progress:
-            run_all(client, trials(), keep)
-    except KeyboardInterrupt:
-        print(f"fingergait: stopped; --resume --out {store.folder} goes on", file=sys.stderr)
-        raise
+    with progress:
+        run_all(client, trials(), keep)
 
 
 def _row(spec: CampaignSpec, numeric: dict[str, bool], sample: Sample, outcome: Outcome) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.stats import truncnorm
 
-from fingergait.scenario.fields import Positive, Table
+from fingergait.fields import Positive, Table
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]

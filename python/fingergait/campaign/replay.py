@@ -5,6 +5,7 @@ import shlex
 from typing import Any
 
 from fingergait.campaign.spec import CampaignSpec
+from fingergait.paths import as_text
 
 
 def replay(spec: CampaignSpec, overrides: dict[str, Any]) -> str:
@@ -12,7 +13,7 @@ def replay(spec: CampaignSpec, overrides: dict[str, Any]) -> str:
     words = ["fingergait", "run", spec.scenario]
     for key, value in (spec.set | overrides).items():
         words += ["--seed", str(value)] if key == "seed" else ["--set", f"{key}={toml(value)}"]
-    return shlex.join(words)
+    return as_text(shlex.join(words))
 
 
 def toml(value: Any) -> str:

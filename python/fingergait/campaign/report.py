@@ -19,7 +19,7 @@ from fingergait.campaign.statistics import (
     fault_rows,
     percentile,
 )
-from fingergait.campaign.store import write_atomic
+from fingergait.files import write_text
 from fingergait.paths import find
 
 _SHOWN = 12  # failures listed for each cause
@@ -69,7 +69,7 @@ def write_campaign_page(
         shown=_SHOWN,
         timing=timing_figures(timings),
     )
-    write_atomic(path, text)
+    write_text(path, text)
 
 
 def failures(rows: pa.Table) -> list[tuple[str, list[dict[str, Any]]]]:

@@ -9,10 +9,10 @@ from pydantic import Field, ValidationError
 
 from fingergait._core import ConfigError
 from fingergait.campaign.distributions import Distribution
-from fingergait.paths import find
+from fingergait.fields import Index, NonNegative, Table
+from fingergait.paths import as_text, find
 from fingergait.scenario import Scenario
 from fingergait.scenario.faults import KINDS
-from fingergait.scenario.fields import Index, NonNegative, Table
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -81,10 +81,10 @@ class CampaignSpec(Table):
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path.name}: expected TOML, found: {error}") from None
-        values.setdefault("name", path.stem)
+        values.setdefault("name", as_text(path.stem))
         if isinstance(values.get("scenario"), str):
             beside = path.parent / values["scenario"]
-            values["scenario"] = str(beside.resolve()) if beside.is_file() else values["scenario"]
+            values["scenario"] = as_text(beside.resolve()) if beside.is_file() else values["scenario"]
         if samples is not None:
             values["samples"] = samples
         try:

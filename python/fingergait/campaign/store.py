@@ -5,7 +5,6 @@ change), `timing/` (how long each run took) and, at the end, `report.html` and `
 """
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,11 @@ from uuid import uuid4
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
 from fingergait._core import ConfigError
 from fingergait.campaign.trial import METRICS, OBSERVED
+from fingergait.files import make_folder, whole_file, write_text
 
 _TYPES = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
 _MERGE = 256  # parts that become one
@@ -76,20 +75,17 @@ class Store:
     def __init__(self, folder: Path, manifest: dict[str, Any], schema: pa.Schema, resume: bool) -> None:
         self.folder, self._schema = folder, schema
         self._parts = {"data": schema, "timing": TIMING}
-        try:
-            for name in self._parts:
-                (folder / name).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            found = f"{folder} ({error.strerror})"
-            raise ConfigError(f"--out: expected a folder that can be written, found {found}") from None
+        make_folder(folder)
+        for name in self._parts:
+            make_folder(folder / name)
         path = folder / "campaign.json"
-        if path.is_file():
+        if path.is_file() and (resume or any((folder / "data").glob("[!.]*.parquet"))):
             _compare(json.loads(path.read_text(encoding="utf-8")), manifest, folder, resume)
         elif resume:
             raise ConfigError(f"--resume: expected the folder of a campaign, found none in {folder}")
-        for left in folder.glob("*/.*.tmp"):
+        for left in folder.glob("*/.*.tmp*"):
             left.unlink()
-        write_atomic(path, json.dumps(manifest, indent=2, sort_keys=True) + "\n")
+        write_text(path, json.dumps(manifest, indent=2, sort_keys=True) + "\n")
 
     def done(self) -> set[int]:
         """Indices of the runs that have a row."""
@@ -124,7 +120,11 @@ class Store:
         if not files:
             table = self._parts[name].empty_table()
             return table if columns is None else table.select(columns)
-        return _unique(ds.dataset(files, schema=self._parts[name]).to_table(columns=columns))
+        tables = []
+        for file in files:
+            with file.open("rb") as source:
+                tables.append(pq.read_table(source, columns=columns))
+        return _unique(pa.concat_tables(tables))
 
     def _merge(self, name: str, pattern: str, least: int) -> None:
         """Puts `least` or more files into one. A kill in between leaves rows twice, which reading sorts out."""
@@ -146,26 +146,8 @@ def _unique(table: pa.Table) -> pa.Table:
 
 
 def _write(table: pa.Table, folder: Path, name: str) -> None:
-    temporary = folder / f".{name}.tmp"
-    pq.write_table(table, temporary, compression="zstd")
-    _sync(temporary)
-    os.replace(temporary, folder / name)
-
-
-def write_atomic(path: Path, text: str) -> None:
-    """Writes a text file that is there whole or not at all."""
-    temporary = path.with_name(f".{path.name}.tmp")
-    temporary.write_text(text, encoding="utf-8")
-    _sync(temporary)
-    os.replace(temporary, path)
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    with whole_file(folder / name) as temporary, temporary.open("wb") as file:
+        pq.write_table(table, file, compression="zstd")
 
 
 def _compare(found: dict[str, Any], wanted: dict[str, Any], folder: Path, resume: bool) -> None:

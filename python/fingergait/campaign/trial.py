@@ -10,7 +10,7 @@ import numpy as np
 
 from fingergait import _core
 from fingergait.campaign.build import build_id
-from fingergait.hand import compile_spec, find_fingers, load_spec
+from fingergait.hand import import_hand
 from fingergait.paths import find
 from fingergait.run.log import Log
 from fingergait.run.simulate import simulate
@@ -20,6 +20,7 @@ from fingergait.sim.scene import true_inertia
 METRICS: dict[str, type] = {
     "duration_s": float,
     "dropped": bool,
+    "completed": bool,
     "lost_reason": str,
     "rotation_rad": float,
     "max_position_error_m": float,
@@ -159,8 +160,7 @@ def command_limits(scenario: Scenario) -> tuple[float, float]:
 
 @cache
 def _hand_limit(file: str) -> float:
-    """Largest torque of the hand's weakest motor, N m."""
+    """Torque of the hand's weakest motor, N m."""
     path = find(file, "", ".xml", "hand.file")
-    model = compile_spec(load_spec(path), path.name)
-    motors = [motor for finger in find_fingers(model, path.name) for motor in finger.actuators]
-    return float(np.abs(model.actuator_forcerange[motors]).min())
+    motors = [motor for finger in import_hand(path).fingers for motor in finger.motors]
+    return min(max(-motor.low, motor.high) for motor in motors)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingergait.hand import compile_spec, find_fingers, load_spec
+from fingergait.hand import import_hand
 from fingergait.paths import find
 from fingergait.run.log import Log
 from fingergait.scenario import Scenario
@@ -58,8 +58,8 @@ def active_constraints(log: Log, scenario: Scenario) -> list[dict[str, Any]]:
 
 def _flags(log: Log, scenario: Scenario) -> dict[str, Flags]:
     path = find(scenario.hand.file, "", ".xml", "hand.file")
-    model = compile_spec(load_spec(path), path.name)
-    fingers = find_fingers(model, path.name)
+    hand = import_hand(path)
+    model, fingers = hand.model, hand.fingers
     lower, upper = model.jnt_range[[joint for finger in fingers for joint in finger.joints]].T
     torque = np.abs(model.actuator_forcerange[[motor for finger in fingers for motor in finger.actuators]]).min(axis=1)
     torque = np.minimum(torque, scenario.force.get("tau_max", np.inf))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jinja2
 
+from fingergait.files import write_text
 from fingergait.reproduce.ablations import CONDITIONS, VARIANTS
 from fingergait.reproduce.claim import Claim
 from fingergait.reproduce.experiment import Experiment
@@ -68,7 +69,7 @@ def write_page(result: Reproduction, path: Path) -> None:
         conditions=list(CONDITIONS),
         settings=settings_of(result),
     )
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _section(experiment: Experiment, result: Reproduction) -> Section:

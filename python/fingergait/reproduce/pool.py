@@ -1,11 +1,8 @@
 """Runs cases in parallel processes, with a progress bar."""
 
 import contextlib
-import multiprocessing
-import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +14,9 @@ from fingergait.reproduce.case import Case, Outcome
 from fingergait.run.log import Log
 from fingergait.run.report.film import film_strip
 from fingergait.run.simulate import simulate
+from fingergait.stopping import Stopped, in_processes
+
+Keep = Callable[[dict[str, Any], Stopped], None]
 
 Job = tuple[str, float, Callable[..., Any], tuple[Any, ...]]
 """Label, simulated seconds (the bar's measure), a function of a module, and its arguments."""
@@ -38,7 +38,7 @@ def _film(log: Log) -> tuple[bytes | None, str]:
         return (None, problem) if problem is not None else (picture.read_bytes(), "")
 
 
-def run_jobs(jobs: Sequence[Job], workers: int, quiet: bool = False) -> list[Any]:
+def run_jobs(jobs: Sequence[Job], workers: int, quiet: bool = False, keep: Keep | None = None) -> list[Any]:
     """The results of all jobs in their order; the longest start first.
 
     Parameters
@@ -49,34 +49,26 @@ def run_jobs(jobs: Sequence[Job], workers: int, quiet: bool = False) -> list[Any
         Processes; 1 runs everything in this one.
     quiet
         Show no progress bar.
+    keep
+        Given the results so far, by label, where the user stops the command.
     """
     results: dict[int, Any] = {}
-    with _bar(sum(job[1] for job in jobs), quiet) as advance:
-        for index, result in _results(jobs, workers):
-            results[index] = result
-            advance(jobs[index])
+    try:
+        with _bar(sum(job[1] for job in jobs), quiet) as advance:
+            for index, result in _results(jobs, workers):
+                results[index] = result
+                advance(jobs[index])
+    except Stopped as stop:
+        if keep is not None:
+            keep({jobs[index][0]: result for index, result in results.items()}, stop)
+        raise
     return [results[index] for index in range(len(jobs))]
 
 
 def _results(jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, Any]]:
     order = sorted(range(len(jobs)), key=lambda index: -jobs[index][1])
-    if workers == 1:
-        for index in order:
-            _, _, function, arguments = jobs[index]
-            yield index, function(*arguments)
-        return
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        pending = {pool.submit(jobs[index][2], *jobs[index][3]): index for index in order}
-        try:
-            for future in as_completed(pending):
-                yield pending[future], future.result()
-        except BaseException:
-            for future in pending:
-                future.cancel()
-            raise
+    for number, result in in_processes([jobs[index][2:] for index in order], workers):
+        yield order[number], result
 
 
 @contextlib.contextmanager

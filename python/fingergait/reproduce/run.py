@@ -3,16 +3,18 @@
 import json
 import time
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fingergait._core import ConfigError
+from fingergait.files import make_folder, write_text
 from fingergait.reproduce.ablations import ablation_cases, ablation_table
 from fingergait.reproduce.case import Case
 from fingergait.reproduce.experiments import all_experiments
 from fingergait.reproduce.limits import Bisection, Limit, all_limits, bisect_by_key
-from fingergait.reproduce.pool import Job, run_case, run_jobs
+from fingergait.reproduce.pool import Job, Keep, run_case, run_jobs
 from fingergait.reproduce.result import Reproduction, settings_of
+from fingergait.stopping import Stopped
 
 
 def reproduce(out: Path, quick: bool, workers: int, quiet: bool = False) -> dict[str, Any]:
@@ -29,22 +31,20 @@ def reproduce(out: Path, quick: bool, workers: int, quiet: bool = False) -> dict
     quiet
         Show no progress.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out: expected a folder that can be written, found {out} ({error.strerror})") from None
-    result = run_all(quick, workers, quiet)
+    make_folder(out)
+    keep = partial(_keep, out / "partial.json")
+    result = run_all(quick, workers, quiet, keep)
     from fingergait.reproduce.page import write_page  # matplotlib is slow to import
 
     report = out / "index.html"
     write_page(result, report)
     summary = as_json(result, report)
-    (out / "reproduce.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_text(out / "reproduce.json", json.dumps(summary, indent=2) + "\n")
     return summary
 
 
-def run_all(quick: bool, workers: int, quiet: bool = False) -> Reproduction:
-    """Runs every experiment, bisection and ablation; writes nothing."""
+def run_all(quick: bool, workers: int, quiet: bool = False, keep: Keep | None = None) -> Reproduction:
+    """Runs every experiment, bisection and ablation; writes nothing. `keep`: see `run_jobs`."""
     begin = time.perf_counter()
     experiments, limits = all_experiments(quick), all_limits()
     cases = [case for experiment in experiments for case in experiment.cases]
@@ -53,7 +53,7 @@ def run_all(quick: bool, workers: int, quiet: bool = False) -> Reproduction:
     searches = [(limit, seed) for limit in limits for seed in range(seeds)]
     jobs = [_case_job(case) for case in (*cases, *ablations)]
     jobs += [_search_job(limit, seed, halvings) for limit, seed in searches]
-    results = run_jobs(jobs, workers, quiet)
+    results = run_jobs(jobs, workers, quiet, keep)
     outcomes = {case.key: outcome for case, outcome in zip(cases, results, strict=False)}
     removed = {case.key: outcome for case, outcome in zip(ablations, results[len(cases) :], strict=False)}
     found: list[Bisection] = results[len(cases) + len(ablations) :]
@@ -67,6 +67,17 @@ def run_all(quick: bool, workers: int, quiet: bool = False) -> Reproduction:
         bisections={limit.key: [b for b in found if b.key == limit.key] for limit in limits},
         ablations=ablation_table(removed),
     )
+
+
+def _keep(path: Path, results: dict[str, Any], stop: Stopped) -> None:
+    """Writes the figures of the runs that are done when the user stops the command, and says so in `stop`."""
+    figures = {
+        label: asdict(result) if isinstance(result, Bisection) else {**result.metrics, **result.extra}
+        for label, result in results.items()
+    }
+    if figures:
+        write_text(path, json.dumps(figures, indent=2, default=str) + "\n")
+        stop.args = (f"no verdict yet; the figures of the {len(figures)} runs that are done: {path}",)
 
 
 def _case_job(case: Case) -> Job:

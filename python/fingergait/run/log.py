@@ -14,27 +14,30 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from fingergait._core import ConfigError, Diagnostics
-from fingergait.sim.sensors import Sensors
+from fingergait.files import whole_file
+from fingergait.sim.sensors import Sensors, joint_names
 
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _GROW = 4096  # rows added at a time
 
 
-def columns(fingers: list[str], n_joints: int) -> list[str]:
+def columns(fingers: list[str], counts: list[int]) -> list[str]:
     """Names of a log's columns after `t`.
 
     `object_*`, `desired_*`: true and desired pose of the object in W. `q_*`: true joint angles, rad.
-    `friction_force_*`: true tangential force at each tip, N. `measured_*`: what the sensors said. The rest: the core's
+    `friction_force_*`: true tangential force at each tip, N. `link_contact`: 1 where another part of a finger than its
+    tip touches the object. `measured_*`: what the sensors said. The rest: the core's
     `Diagnostics`.
     """
-    joints = [f"{name}_{i + 1}" for name in fingers for i in range(n_joints)]
+    joints = joint_names(fingers, counts)
     return [
         *(f"object_{name}" for name in _POSE),
         *(f"desired_{name}" for name in _POSE),
         *(f"q_{joint}" for joint in joints),
         *(f"friction_force_{name}" for name in fingers),
-        *Sensors.columns(fingers, n_joints),
-        *Diagnostics.columns(len(fingers), n_joints),
+        "link_contact",
+        *Sensors.columns(fingers, counts),
+        *Diagnostics.columns(len(fingers), counts),
     ]
 
 
@@ -78,6 +81,10 @@ class Log:
         """Times, s."""
         return self._t[: self._length]
 
+    def raw(self) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+        """Times and rows as they lie in memory, with room for more behind; for readers of a log that grows."""
+        return self._t, self._rows
+
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """The column called `name`."""
         return self._rows[: self._length, self._index[name]].astype(np.float64)
@@ -104,13 +111,15 @@ class Log:
             [("t", pa.float64()), *((name, pa.float32()) for name in self.names)],
             metadata=metadata,
         )
-        pq.write_table(pa.Table.from_arrays(columns, schema=schema), path, compression="zstd")
+        with whole_file(path) as temporary, temporary.open("wb") as file:
+            pq.write_table(pa.Table.from_arrays(columns, schema=schema), file, compression="zstd")
 
     @classmethod
     def read(cls, path: Path) -> "Log":
         """The log in a Parquet file that `write` wrote."""
         try:
-            table = pq.read_table(path)
+            with path.open("rb") as file:
+                table = pq.read_table(file)
         except (OSError, pa.ArrowInvalid) as error:
             raise ConfigError(f"{path}: expected a log in Parquet, found: {' '.join(str(error).split())}") from None
         metadata = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}

@@ -38,14 +38,23 @@ class LossMonitor:
         self._since: float | None = None
         self.symptom = ""
 
-    def update(self, t: float, true: Array, desired: Array, normal_forces: Array, standing: bool = False) -> bool:
+    def update(
+        self,
+        t: float,
+        true: Array,
+        desired: Array,
+        normal_forces: Array,
+        standing: bool = False,
+        lying: bool = False,
+    ) -> bool:
         """True once the object is lost, from the poses (7,) and the fingertips' normal forces, N.
 
         `standing`: the controller lets the reference stand in this step. From then on only a tilt counts, until the
-        object has caught up with the desired yaw.
+        object has caught up with the desired yaw. `lying`: the controller has set the object down, and need not touch
+        it.
         """
         self._lags = standing or (self._lags and _angle(true.tolist(), desired.tolist()) > ORIENTATION_LIMIT)
-        symptom = self._symptom(t, true.tolist(), desired.tolist(), normal_forces)
+        symptom = self._symptom(t, true.tolist(), desired.tolist(), normal_forces, lying)
         if symptom is None:
             self._since = None
             return False
@@ -53,7 +62,7 @@ class LossMonitor:
             self._since, self.symptom = t, symptom
         return t - self._since >= SUSTAINED
 
-    def _symptom(self, t: float, p: list[float], d: list[float], normal_forces: Array) -> str | None:
+    def _symptom(self, t: float, p: list[float], d: list[float], normal_forces: Array, lying: bool) -> str | None:
         stepping = self._step_at <= t < self._step_at + _STEP_TIME
         position_limit = POSITION_LIMIT + (self._allowance[0] if stepping else 0.0)
         orientation_limit = ORIENTATION_LIMIT + (self._allowance[1] if stepping else 0.0)
@@ -62,7 +71,7 @@ class LossMonitor:
         angle = _tilt(p, d) if self._tilt_only or self._lags else _angle(p, d)
         if angle > orientation_limit:
             return f"the orientation error passed {ORIENTATION_LIMIT} rad"
-        if t > 0.0 and np.count_nonzero(normal_forces) < 2:
+        if t > 0.0 and not lying and np.count_nonzero(normal_forces) < 2:
             return "fewer than two fingertips touched the object"
         return None
 
@@ -110,8 +119,9 @@ def _joints_at_limits(log: Log, scene: SceneModel, before: NDArray[np.bool_]) ->
 
 
 def _torques_at_limits(log: Log, scene: SceneModel, before: NDArray[np.bool_]) -> list[str]:
-    limits = torque_limits(scene).ravel()
-    at = (np.abs(log.block("tau_des")[before]) >= 0.999 * limits).mean(axis=0)
+    low, high = torque_limits(scene)
+    tau = log.block("tau_des")[before]
+    at = ((tau >= 0.999 * high) | (tau <= 0.999 * low)).mean(axis=0)
     names = [scene.model.joint(joint).name for finger in scene.fingers for joint in finger.joints]
     saturated = [f"{name} {100 * share:.0f} %" for name, share in zip(names, at, strict=True) if share > 0.1]
     return [f"torques were at their limit ({', '.join(saturated)} of the time)"] if saturated else []

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors, yaw_reached
+from fingergait.run.regrasping import regrasp_metrics
+from fingergait.run.verdict import verdict
 from fingergait.scenario import Disturbance, Scenario
 
 Array = NDArray[np.float64]
@@ -16,6 +18,7 @@ CHANNELS = ("x", "y", "z", "rx", "ry", "rz")
 SETTLED = 0.05  # of the step, the paper's threshold
 RECOVERED = 0.10  # of the peak
 _BEFORE = 1.0  # s before a pulse that say how large the error was without it; a gait takes about as long
+_STAYED = 0.3  # s that the error must stay back: longer than K swings, shorter than until a later gait brings its own
 _AFTER = 2.0  # s after a pulse in which its peak and recovery are sought, unless the next one begins
 
 
@@ -29,10 +32,13 @@ class Timing:
     solver: dict[str, int] = field(default_factory=dict)
 
 
-def metrics_of(log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: float) -> dict[str, Any]:
+def metrics_of(
+    log: Log, scenario: Scenario, lost: str | None, timing: Timing, tau_max: Array | float
+) -> dict[str, Any]:
     """The figures of `fingergait run --json`, without paths, versions and simulator settings.
 
-    `lost` says why the object was lost, if it was; `tau_max` is the joints' torque limit, N m.
+    `lost` says why the object was lost, if it was; `tau_max` is the torque limit of each joint, (n_q,) or one,
+    N m.
     """
     t = log.t
     errors = pose_errors(log.pose("object"), log.pose("desired"))  # (T, 6)
@@ -43,6 +49,7 @@ def metrics_of(log: Log, scenario: Scenario, lost: str | None, timing: Timing, t
         "seed": scenario.seed,
         "duration_s": float(t[-1]) + scenario.period,
         "dropped": lost is not None,
+        **verdict(log, scenario, lost is not None),
         "lost_reason": lost,
         "rotation_rad": float(yaw_reached(log.pose("object"))[-1]),
         "metrics_from_s": scenario.metrics_from,
@@ -56,6 +63,7 @@ def metrics_of(log: Log, scenario: Scenario, lost: str | None, timing: Timing, t
             for pulse in scenario.disturbance
         ],
         **gait_metrics(log, scenario),
+        "regrasp": regrasp_metrics(log),
         "saturated_fraction": saturated_fraction(log, scenario, tau_max),
         "deadline_misses": int((timing.step_ns > 1e9 * scenario.period).sum()),
         "solver": timing.solver,
@@ -92,10 +100,11 @@ def settling_times(t: Array, errors: Array, step: tuple[float, ...], at: float) 
 
 
 def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturbance, until: float) -> float | None:
-    """Time from a pulse's end until the error it caused has gone for good, s; None where it hasn't by `until`.
+    """Time from a pulse's end until the error it caused has gone, s; None where it hasn't by `until`.
 
-    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it. A force is
-    judged by the position error (T,), a torque by the orientation error (T,), both by the later of the two.
+    Gone: back under the largest error of the second before the pulse plus 10 % of the peak above it, and there for
+    0.3 s: what a gait brings later is not the pulse's. A force is judged by the position error (T,), a torque by the
+    orientation error (T,), both by the later of the two.
     """
     times = []
     for error, cause in ((position, pulse.force), (orientation, pulse.torque)):
@@ -107,11 +116,11 @@ def recovery_time(t: Array, position: Array, orientation: Array, pulse: Disturba
             return None
         level = before.max()
         limit = level + RECOVERED * max(0.0, error[window].max() - level)
-        end = pulse.at + pulse.duration
-        time = _last_true(t[window], error[window] > limit, end)
+        after = window & (t >= pulse.at + pulse.duration)
+        time = _back(t[after], error[after] > limit)
         if time is None:
             return None
-        times.append(max(0.0, time))
+        times.append(time)
     return max(times, default=None)
 
 
@@ -143,7 +152,7 @@ def gait_metrics(log: Log, scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def saturated_fraction(log: Log, scenario: Scenario, tau_max: float) -> float | None:
+def saturated_fraction(log: Log, scenario: Scenario, tau_max: Array | float) -> float | None:
     """Share of the counted control steps in which some joint's torque command is at its limit."""
     counted = log.t >= scenario.metrics_from
     commands = np.abs(log.block("tau_des")[counted])
@@ -169,6 +178,18 @@ def _last_true(t: Array, outside: NDArray[np.bool_], begin: float) -> float | No
     if not len(last):
         return 0.0
     return None if last[-1] + 1 >= len(t) else float(t[last[-1] + 1] - begin)
+
+
+def _back(t: Array, outside: NDArray[np.bool_]) -> float | None:
+    """Time from the first sample until none is `outside` for `_STAYED`, or any more; None where the last one is."""
+    if not len(t) or outside[-1]:
+        return None
+    begin = 0
+    for last in np.flatnonzero(outside):
+        if t[last] - t[begin] >= _STAYED:
+            break
+        begin = int(last) + 1
+    return float(t[begin] - t[0])
 
 
 def _next_start(scenario: Scenario, pulse: Disturbance) -> float:

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from fingergait import _core
-from fingergait.hand import hand_json
+from fingergait.files import make_folder, whole_file
+from fingergait.hand import model_json
 from fingergait.paths import find
 from fingergait.run.simulate import load_controller
 from fingergait.scenario import Scenario, parse_override
@@ -30,7 +31,7 @@ FORMAT = "fingergait-recording/2"
 def record(scenario: Scenario, out: Path) -> int:
     """Runs a scenario in the closed loop and writes its measurements and references to `out`; gives the rows."""
     plant = MujocoPlant(scenario)
-    hand = hand_json(find(scenario.hand.file, "", ".xml", "hand.file"))
+    hand = model_json(plant.scene.hand)
     planner = _core.DualStagePlanner(_core.HandModel(hand), load_controller(scenario), plant.config)
     artefact = find(scenario.controller.file, "controllers", ".json", "controller.file").read_text(encoding="utf-8")
     measurement = plant.reset()
@@ -49,12 +50,12 @@ def record(scenario: Scenario, out: Path) -> int:
         "controller": {key: value for key, value in json.loads(artefact).items() if key != "provenance"},
         "config": json.loads(plant.config),
         "fingers": len(plant.scene.fingers),
-        "joints": plant.scene.n_joints,
+        "joints": plant.scene.counts[0],
         "rate_hz": scenario.controller.rate_hz,
         "rows": len(rows),
     }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with out.open("wb") as file:
+    make_folder(out.parent, "out")
+    with whole_file(out) as temporary, temporary.open("wb") as file:
         file.write(json.dumps(head, separators=(",", ":")).encode() + b"\n")
         file.write(np.asarray(rows, dtype="<f4").tobytes())
     return len(rows)

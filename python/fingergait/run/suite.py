@@ -1,19 +1,17 @@
 """The sampled suite: many seeds of `sampling.sampled`, in parallel processes, each held against the same limits."""
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable
 from typing import Any
 
-from fingergait._core import FingergaitError
 from fingergait.run.sampling import missed, sampled
 from fingergait.run.simulate import simulate
 from fingergait.scenario import parse_override
+from fingergait.stopping import in_processes
 
 ROW = (
     "seed",
     "dropped",
+    "completed",
     "lost_reason",
     "rotation_rad",
     "max_position_error_m",
@@ -63,25 +61,7 @@ def run_suite(
         KEY=VALUE on every one.
     """
     rows = []
-    for row in _rows(seeds, workers, base, overrides):
+    for _, row in in_processes([(run_seed, (seed, base, overrides)) for seed in seeds], workers):
         done(row)
         rows.append(row)
     return sorted(rows, key=lambda row: seeds.index(row["seed"]))
-
-
-def _rows(seeds: list[int], workers: int, base: str, overrides: list[str]) -> Iterator[dict[str, Any]]:
-    if workers == 1:
-        yield from (run_seed(seed, base, overrides) for seed in seeds)
-        return
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        pending = [pool.submit(run_seed, seed, base, overrides) for seed in seeds]
-        try:
-            for future in as_completed(pending):
-                yield future.result()
-        except (FingergaitError, KeyboardInterrupt):
-            for future in pending:
-                future.cancel()
-            raise

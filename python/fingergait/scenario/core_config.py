@@ -6,18 +6,19 @@ from typing import Any
 from fingergait.scenario.scenario import Scenario
 
 
-def core_config(scenario: Scenario, tau_max: float) -> str:
+def core_config(scenario: Scenario) -> str:
     """JSON for `_core.DualStagePlanner` and `_core.TorquePid`.
 
-    The scenario's own keys set the control rate, the nominal mass and the assumed friction, and `tau_max`, N m, of the
-    hand's weakest motor sets the torque limit; what the tables `gait`, `force`, `robust`, `torque` and `safety` say
+    The scenario's own keys set the control rate, the nominal mass and the assumed friction,;
+    torque limits are the hand's; what the tables `gait`, `force`, `robust`, `torque` and `safety` say
     goes before.
     """
     config: dict[str, Any] = {
         "rate_hz": scenario.controller.rate_hz,
         "mass": scenario.object.mass,
         "gait": scenario.gait,
-        "force": {"friction": scenario.controller.friction, "tau_max": tau_max, **scenario.force},
+        "regrasp": scenario.regrasp,
+        "force": {"friction": scenario.controller.friction, **scenario.force},
         "robust": scenario.robust,
         "torque": scenario.torque,
     }

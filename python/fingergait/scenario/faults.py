@@ -7,7 +7,9 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
-from fingergait.scenario.fields import Index, NonNegative, Positive, Table, Twist
+from fingergait.fields import Index, NonNegative, Positive, Table, Twist
+
+Axis = Literal[0, 1, 2]
 
 _EDGE = 1e-9  # s: a time that is this close to a fault's edge is on it
 
@@ -72,6 +74,13 @@ class EncoderOffset(FaultWindow):
     shift: float
 
 
+class EncoderDropout(FaultWindow):
+    """A read fails: in the share `share` of the control steps all joint angles are zero, at random."""
+
+    kind: Literal["encoder_dropout"] = "encoder_dropout"
+    share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
+
+
 class TactileLost(FaultWindow):
     """A tactile sensor feels nothing; all of them where `finger` is absent."""
 
@@ -85,6 +94,20 @@ class TactileStuck(FaultWindow):
     kind: Literal["tactile_stuck"] = "tactile_stuck"
     finger: Index
     value: NonNegative = 30.0
+
+
+class TactileScale(FaultWindow):
+    """All tactile forces are `factor` times the true ones, as in another unit."""
+
+    kind: Literal["tactile_scale"] = "tactile_scale"
+    factor: Positive = 1000.0
+
+
+class TactileAxes(FaultWindow):
+    """The axes of all tactile places are in another `order`: [1, 0, 2] swaps the first two."""
+
+    kind: Literal["tactile_axes"] = "tactile_axes"
+    order: tuple[Axis, Axis, Axis] = (1, 0, 2)
 
 
 class ClockStall(FaultWindow):
@@ -160,8 +183,11 @@ Fault = Annotated[
     | EncoderStuck
     | EncoderRange
     | EncoderOffset
+    | EncoderDropout
     | TactileLost
     | TactileStuck
+    | TactileScale
+    | TactileAxes
     | ClockStall
     | ClockJump
     | DroppedTicks

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fingergait.scenario.scenario import ReferenceConfig
+from fingergait.scenario.steering import Steering
 
 Array = NDArray[np.float64]
 
@@ -27,9 +28,11 @@ class Trajectory:
         The table.
     start
         Pose (7,) of the object in W that the motion starts from: position, m, and wxyz quaternion.
+    steered
+        Let `steering` change the motion while it is under way; `sample` must then be called in order of time.
     """
 
-    def __init__(self, config: ReferenceConfig, start: ArrayLike) -> None:
+    def __init__(self, config: ReferenceConfig, start: ArrayLike, steered: bool = False) -> None:
         start = np.asarray(start, dtype=float)
         self._config = config
         self._p = [float(x) for x in start[:3]]
@@ -38,6 +41,7 @@ class Trajectory:
         self._q_step = _multiply(_exponential(config.step[3:]), self._q)
         self._pose = np.empty(7)
         self._twist = np.zeros(6)
+        self.steering = Steering(config.yaw_rate, config.swing_amplitude) if steered else None
 
     def sample(self, t: float) -> tuple[Array, Array]:
         """Desired pose (7,) in W and twist (6,), [linear; angular] in W, at time t, s. The arrays are reused."""
@@ -47,12 +51,17 @@ class Trajectory:
         rise, rise_rate = _quintic((t - c.lift_at) / c.lift_time)
         since = t - c.motion_start
         yaw, yaw_rate = self.yaw(t)
+        amplitude, amplitude_rate = c.swing_amplitude, 0.0
         grow, grow_rate = _quintic(since / c.blend)
+        if self.steering is not None:
+            steering = self.steering
+            steering.advance(t, grow)
+            yaw, yaw_rate = yaw + steering.yaw, yaw_rate + steering.yaw_rate
+            amplitude, amplitude_rate = amplitude + steering.swing, steering.swing_rate
         phase = c.swing_frequency * since
-        swing = c.swing_amplitude * grow * math.sin(phase)
-        swing_rate = c.swing_amplitude * (
-            grow * c.swing_frequency * math.cos(phase) + grow_rate / c.blend * math.sin(phase)
-        )
+        swing = amplitude * grow * math.sin(phase)
+        swing_rate = amplitude * (grow * c.swing_frequency * math.cos(phase) + grow_rate / c.blend * math.sin(phase))
+        swing_rate += amplitude_rate * grow * math.sin(phase)
         cos_y, sin_y = math.cos(0.5 * swing), math.sin(0.5 * swing)
         cos_z, sin_z = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
         turn = (cos_y * cos_z, sin_y * sin_z, sin_y * cos_z, cos_y * sin_z)  # q_y q_z
@@ -63,6 +72,9 @@ class Trajectory:
         self._twist[3] = yaw_rate * math.sin(swing)
         self._twist[4] = swing_rate
         self._twist[5] = yaw_rate * math.cos(swing)
+        if self.steering is not None:
+            self._twist[:2] = 0.0
+            self.steering.move(self._pose, self._twist)
         return self._pose, self._twist
 
     def yaw(self, t: float) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """A scenario: plant, reference, disturbances and the errors of the model, read from TOML and checked.
 
-The tables `gait`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they are passed
-on as they are, and the core refuses what it doesn't know.
+The tables `gait`, `regrasp`, `force`, `torque`, `robust` and `safety` belong to the compiled core's configuration: they
+are passed on as they are, and the core refuses what it doesn't know.
 """
 
 import json
@@ -12,10 +12,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from fingergait._core import ConfigError
+from fingergait.fields import NonNegative, Positive, Table, Twist, Vector
 from fingergait.object.shapes import SIZES, Shape
-from fingergait.paths import find
+from fingergait.paths import as_text, find
 from fingergait.scenario.faults import KINDS, Fault
-from fingergait.scenario.fields import NonNegative, Positive, Table, Twist, Vector
+from fingergait.scenario.inputs import Input
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -24,17 +25,38 @@ else:
 
 
 class HandConfig(Table):
-    """The hand: an MJCF file or a packaged name."""
+    """The hand: an MJCF or URDF file, an adopted bundle's folder, or a packaged name; its facts file (absent:
+    `<stem>.facts.toml` beside it); pose of the model in the world [x, y, z, rx, ry, rz], m and rotation vector, where
+    the file's own does not serve."""
 
     file: str = "hand"
+    facts: str | None = None
+    pose: Twist | None = None
+
+
+class SupportConfig(Table):
+    """A table below the object: height of its top, m (absent: none), and where its middle is, m.
+
+    tilt_deg
+        Its tilt, a rotation vector about x and y through the middle of its top, degrees.
+    softness
+        How many times softer than the fingertips its contact is, at the same share of critical damping.
+    """
+
+    height: float | None = None
+    position: tuple[float, float] = (0.0, 0.0)
+    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    softness: Positive = 1.0
 
 
 class ObjectConfig(Table):
-    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg)."""
+    """The object as the controller believes it: shape, lengths (m) as `shapes.SIZES` says, mass (kg); nominal pose
+    at the start [x, y, z, rx, ry, rz] in W, m and rotation vector (absent: upright amid the fingers, on the palm)."""
 
     shape: Literal["cylinder", "ellipsoid", "box", "cone"] = "cylinder"
     size: tuple[float, ...] = (0.025, 0.06)
     mass: Positive = 0.5
+    pose: Twist | None = None
 
     @property
     def geometry(self) -> Shape:
@@ -80,8 +102,10 @@ class TruthConfig(Table):
 
 class GraspConfig(Table):
     """How the run starts: contact height above O, m; force (N) with which each tip presses when the controller takes
-    over; time (s) before t = 0 in which the controller holds the start pose."""
+    over; time (s) before t = 0 in which the controller holds the start pose. joints: angles of the independent joints,
+    finger by finger, rad (absent: each tip touches the side at the azimuth of its finger's base)."""
 
+    joints: tuple[float, ...] | None = None
     height: float = 0.0
     press: Positive = 0.5
     settle: NonNegative = 0.3
@@ -172,6 +196,7 @@ class Scenario(Table):
     seed: Annotated[int, Field(ge=0)] = 0
     metrics_from_s: float | None = None
     hand: HandConfig = HandConfig()
+    support: SupportConfig = SupportConfig()
     object: ObjectConfig = ObjectConfig()
     truth: TruthConfig = TruthConfig()
     grasp: GraspConfig = GraspConfig()
@@ -181,7 +206,9 @@ class Scenario(Table):
     physics: PhysicsConfig = PhysicsConfig()
     disturbance: tuple[Disturbance, ...] = ()
     fault: tuple[Fault, ...] = ()
+    input: tuple[Input, ...] = ()
     gait: dict[str, Any] = {}
+    regrasp: dict[str, Any] = {}
     force: dict[str, Any] = {}
     torque: dict[str, Any] = {}
     robust: dict[str, Any] = {}
@@ -201,17 +228,17 @@ class Scenario(Table):
             values = tomllib.loads(path.read_text(encoding="utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path.name}: expected TOML, found: {error}") from None
-        values.setdefault("name", path.stem)
-        for table in ("controller", "hand"):
-            _resolve_beside(values, table, path.parent)
+        values.setdefault("name", as_text(path.stem))
+        for table, key in (("controller", "file"), ("hand", "file"), ("hand", "facts")):
+            _resolve_beside(values, table, key, path.parent)
         return cls.build(values, overrides)
 
     @classmethod
     def build(cls, values: dict[str, Any], overrides: dict[str, Any] | None = None) -> "Scenario":
         """The scenario of these TOML values, with dotted keys replaced by `overrides`; errors as `load`."""
-        values = json.loads(json.dumps(values))
+        values = json.loads(as_text(json.dumps(values, ensure_ascii=False)))
         for key, value in (overrides or {}).items():
-            _assign(values, key, value)
+            _assign(values, key, json.loads(as_text(json.dumps(value, ensure_ascii=False))))
         try:
             return cls.model_validate(values)
         except ValidationError as error:
@@ -266,11 +293,13 @@ def _item(items: list[Any], part: str, key: str) -> Any:
     return items[int(part)]
 
 
-def _resolve_beside(values: dict[str, Any], table: str, folder: Path) -> None:
+def _resolve_beside(values: dict[str, Any], table: str, key: str, folder: Path) -> None:
     """Makes a file that a scenario names relative to itself absolute; packaged names stay as they are."""
     entry = values.get(table)
-    if isinstance(entry, dict) and isinstance(entry.get("file"), str) and (folder / entry["file"]).is_file():
-        entry["file"] = str((folder / entry["file"]).resolve())
+    if isinstance(entry, dict) and isinstance(entry.get(key), str):
+        beside = folder / entry[key]
+        if beside.is_file() or (beside / "hand.xml").is_file():  # a bundle's folder
+            entry[key] = as_text(beside.resolve())
 
 
 def _describe(error: ValidationError) -> str:
@@ -291,8 +320,9 @@ def _describe(error: ValidationError) -> str:
 
 def _keys(loc: tuple[int | str, ...]) -> str:
     """The keys that the table around `loc` has."""
-    if loc[0] in ("disturbance", "fault"):
-        return "one of " + ", ".join((KINDS[str(loc[2])] if loc[0] == "fault" else Disturbance).model_fields)
+    if loc[0] in ("disturbance", "fault", "input"):
+        tables: dict[str, type[Table]] = {"disturbance": Disturbance, "input": Input}
+        return "one of " + ", ".join((tables.get(str(loc[0])) or KINDS[str(loc[2])]).model_fields)
     table: type[BaseModel] = Scenario
     for part in loc[:-1]:
         kind = table.model_fields[str(part)].annotation
@@ -300,4 +330,4 @@ def _keys(loc: tuple[int | str, ...]) -> str:
     return "one of " + ", ".join(table.model_fields)
 
 
-__all__ = ["SIZES", "Disturbance", "ReferenceConfig", "Scenario", "SensorConfig", "parse_override"]
+__all__ = ["SIZES", "Disturbance", "Input", "ReferenceConfig", "Scenario", "SensorConfig", "parse_override"]

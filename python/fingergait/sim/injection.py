@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fingergait._core import ConfigError
 from fingergait.scenario import faults as kinds
-from fingergait.sim.scene import OBJECT, SceneModel
+from fingergait.sim.scene import OBJECT, SceneModel, contact_friction, torque_limits
 
 Array = NDArray[np.float64]
 
@@ -30,19 +30,30 @@ class Injection:
     """
 
     def __init__(self, scene: SceneModel, faults: tuple[kinds.FaultWindow, ...]) -> None:
-        self._n, self._m = len(scene.fingers), scene.n_joints
+        self._joints = scene.joints
         self._scene = scene
         self._faults = faults
         for number, fault in enumerate(faults):
-            _check(fault, number, self._n, self._m)
+            _check(fault, number, scene.joints)
         self._friction = scene.model.geom(OBJECT).friction.copy()
-        self._limits = np.abs(scene.model.actuator_forcerange[scene.act]).min(axis=1)  # (n m,), N m
+        self._low, self._high = torque_limits(scene)
         self.reset()
+
+    def add(self, fault: kinds.FaultWindow) -> None:
+        """Takes one more fault while the run is under way; it must not have begun before now."""
+        _check(fault, len(self._faults), self._joints)
+        self._faults = (*self._faults, fault)
+
+    def friction(self, mu: float) -> None:
+        """Gives the contacts of the object the true sliding friction `mu`, which faults may lower."""
+        self._friction[:] = contact_friction(mu)
+        self._scene.model.geom(OBJECT).friction[:] = self._friction
 
     def reset(self) -> None:
         """Forgets what the faults froze or counted, and gives the contacts their friction back."""
         self._frozen: dict[int, Any] = {}
         self._steps: dict[int, int] = {}
+        self._dice: dict[int, np.random.Generator] = {}
         self._scene.model.geom(OBJECT).friction[:] = self._friction
 
     def read(self, t: float, q: Array, tau: Array, pose: Array, place: Array, force: Array) -> float:
@@ -53,7 +64,7 @@ class Injection:
         t
             True time, s.
         q, tau
-            Joint angles, rad, and torques, N m, (n_fingers, n_joints).
+            Joint angles, rad, and torques, N m, (n_q,), finger by finger.
         pose
             Object pose (7,) in W, wxyz.
         place, force
@@ -66,22 +77,32 @@ class Injection:
                 continue
             match fault:
                 case kinds.SensorNan(sensor=sensor, finger=finger, joint=joint):
-                    arrays = {"encoder": (q,), "torque": (tau,), "pose": (pose,), "tactile": (place, force)}[sensor]
-                    for array in arrays:
-                        array[_which(finger, joint)] = np.nan
+                    if sensor in ("encoder", "torque"):
+                        (q if sensor == "encoder" else tau)[self._at(finger, joint)] = np.nan
+                    else:
+                        for array in (pose,) if sensor == "pose" else (place, force):
+                            array[_which(finger)] = np.nan
                 case kinds.PoseJump(shift=shift):
                     pose[:3] += shift[:3]
                     _turn(pose[3:], np.array(shift[3:]))
                 case kinds.PoseStale():
                     pose[:] = self._freeze(number, pose)
                 case kinds.EncoderStuck(finger=finger, joint=joint):
-                    q[finger, joint] = self._freeze(number, q[finger, joint])
+                    q[self._at(finger, joint)] = self._freeze(number, q[self._at(finger, joint)])
                 case kinds.EncoderRange(finger=finger, joint=joint, value=value):
-                    q[finger, joint] = value
+                    q[self._at(finger, joint)] = value
                 case kinds.EncoderOffset(finger=finger, joint=joint, shift=shift):
-                    q[finger, joint] += shift
+                    q[self._at(finger, joint)] += shift
+                case kinds.EncoderDropout(share=share):
+                    # One number a step, the same in every run.
+                    if self._dice.setdefault(number, np.random.default_rng(number)).random() < share:
+                        q[:] = 0.0
+                case kinds.TactileScale(factor=factor):
+                    force *= factor
+                case kinds.TactileAxes(order=order):
+                    place[:] = place[:, list(order)]
                 case kinds.TactileLost(finger=finger):
-                    place[_which(finger, None)], force[_which(finger, None)] = 0.0, 0.0
+                    place[_which(finger)], force[_which(finger)] = 0.0, 0.0
                 case kinds.TactileStuck(finger=finger, value=value):
                     place[finger], force[finger] = self._freeze(number, place[finger]), value
                 case kinds.ClockStall():
@@ -90,37 +111,37 @@ class Injection:
                     said += shift
                 case kinds.JointOrderSwapped(finger=finger, joint=joint, other=other):
                     for array in (q, tau):
-                        array[finger, [joint, other]] = array[finger, [other, joint]]
+                        self._swap(array, finger, joint, other)
         return said
 
     def command(self, t: float, tau: Array) -> Array:
-        """Torques, N m, (n_fingers, n_joints), that reach the motors' own controllers at time t."""
+        """Torques, N m, (n_q,), that reach the motors' own controllers at time t."""
         for fault in self._faults:
             if isinstance(fault, kinds.JointOrderSwapped) and fault.active(t):
                 tau = tau.copy()
-                tau[fault.finger, [fault.joint, fault.other]] = tau[fault.finger, [fault.other, fault.joint]]
+                self._swap(tau, fault.finger, fault.joint, fault.other)
         return tau
 
     def torque_reading(self, t: float, tau: Array) -> Array:
-        """Joint torques, N m, (n_fingers, n_joints), as the torque controllers measure them."""
+        """Joint torques, N m, (n_q,), as the torque controllers measure them."""
         for fault in self._faults:
             if isinstance(fault, kinds.SensorNan) and fault.sensor == "torque" and fault.active(t):
                 tau = tau.copy()
-                tau[_which(fault.finger, fault.joint)] = np.nan
+                tau[self._at(fault.finger, fault.joint)] = np.nan
         return tau
 
     def motors(self, t: float, torque: Array) -> Array:
-        """Torques (n_fingers * n_joints,), N m, that the motors give of those asked for."""
+        """Torques (n_q,), N m, that the motors give of those asked for."""
         for fault in self._faults:
             if not fault.active(t):
                 continue
             if isinstance(fault, kinds.FingerPowerLoss):
                 torque = torque.copy()
-                torque.reshape(self._n, self._m)[_which(fault.finger, fault.joint)] = 0.0
+                torque[self._at(fault.finger, fault.joint)] = 0.0
             elif isinstance(fault, kinds.MotorWeak):
-                limit = np.full((self._n, self._m), 1.0)
-                limit[_which(fault.finger, None)] = fault.scale
-                torque = np.clip(torque, -limit.ravel() * self._limits, limit.ravel() * self._limits)
+                share = np.ones(len(torque))
+                share[self._at(fault.finger, None)] = fault.scale
+                torque = np.clip(torque, share * self._low, share * self._high)
         return torque
 
     def reference(self, t: float, pose: Array, twist: Array) -> tuple[Array, Array]:
@@ -152,20 +173,31 @@ class Injection:
                     count += fault.ticks
         return count
 
+    def _at(self, finger: int | None, joint: int | None) -> slice | int:
+        """Index of one joint, one finger, or everything in a flat array of the joints."""
+        if finger is None:
+            return slice(None)
+        return self._joints[finger] if joint is None else self._joints[finger].start + joint
+
+    def _swap(self, array: Array, finger: int, joint: int, other: int) -> None:
+        first = self._joints[finger].start
+        array[[first + joint, first + other]] = array[[first + other, first + joint]]
+
     def _freeze(self, number: int, value: Any) -> Any:
         """What fault `number` read when it began."""
         return self._frozen.setdefault(number, value.copy())
 
 
-def _which(finger: int | None, joint: int | None) -> tuple[slice | int, ...] | slice:
-    """Index of one joint, one finger, or everything."""
-    if finger is None:
-        return slice(None)
-    return (finger,) if joint is None else (finger, joint)
+def _which(finger: int | None) -> slice | int:
+    """Index of one finger, or of all."""
+    return slice(None) if finger is None else finger
 
 
-def _check(fault: kinds.FaultWindow, number: int, n_fingers: int, n_joints: int) -> None:
-    for field, count in (("finger", n_fingers), ("joint", n_joints), ("other", n_joints)):
+def _check(fault: kinds.FaultWindow, number: int, joints: list[slice]) -> None:
+    finger = getattr(fault, "finger", None)
+    counts = [own.stop - own.start for own in joints]
+    count_joints = counts[finger] if finger is not None and finger < len(joints) else max(counts)
+    for field, count in (("finger", len(joints)), ("joint", count_joints), ("other", count_joints)):
         value = getattr(fault, field, None)
         if value is not None and value >= count:
             raise ConfigError(f"fault.{number}.{field}: expected 0 to {count - 1}, found {value}")

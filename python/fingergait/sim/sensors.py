@@ -41,7 +41,7 @@ class Sensors:
     def __init__(
         self, scene: SceneModel, data: mujoco.MjData, config: SensorConfig, seed: int, injection: Injection
     ) -> None:
-        n, m = len(scene.fingers), scene.n_joints
+        n, n_q = len(scene.fingers), len(scene.q)
         self._scene, self._config, self._injection = scene, config, injection
         self._q_true = _view(data.qpos, scene.q)
         self._pose_true = data.qpos[scene.object_q : scene.object_q + 7]
@@ -50,27 +50,31 @@ class Sensors:
         self._touch = data.sensordata[first : first + TOUCH_SIZE * n].reshape(n, TOUCH_SIZE)
         self._geom_xpos, self._xmat = data.geom_xpos, data.xmat.reshape(-1, 3, 3)
         self._radius = scene.model.geom_size[scene.tips, :1]  # (n, 1)
-        sizes = [n * m, n * m, 7, 3 * n, n]
+        sizes = [n_q, n_q, 7, 3 * n, n]
         ends = np.cumsum(sizes)
         self.row = np.zeros(ends[-1])
         """The last measurement as one row: q, tau, pose, contact place, contact force."""
         parts = np.split(self.row, ends[:-1])
-        self._q, self._tau = parts[0].reshape(n, m), parts[1].reshape(n, m)
+        self._q, self._tau = parts[0], parts[1]
         self.pose = parts[2]
         self._place, self._normal_force = parts[3].reshape(n, 3), parts[4]
         self.normal_force, self.tangential = np.zeros(n), np.zeros(n)
         """True normal and friction force at each tip, N: for the log and the verdict only."""
-        self._noise = _Noise(np.random.default_rng(seed), [n * m, 6, 3 * n, n])
+        self._noise = _Noise(np.random.default_rng(seed), [n_q, 6, 3 * n, n])
         self._step = 0.0 if config.encoder_bits is None else 2.0 * math.pi / 2**config.encoder_bits
         self._late: deque[tuple[float, Array]] = deque()
         self._next_pose = -math.inf
         self._seen = np.zeros(7)  # the newest pose that has come in, before faults
         self._bias = config.contact_force_bias, np.array(config.contact_place_bias)
 
+    def change(self, key: str, value: float) -> None:
+        """Replaces one number of the errors, `SensorConfig`'s `key`, from the next measurement on."""
+        self._config = self._config.model_copy(update={key: value})
+
     @staticmethod
-    def columns(fingers: list[str], n_joints: int) -> list[str]:
-        """Names of the numbers in `row`."""
-        joints = [f"{name}_{i + 1}" for name in fingers for i in range(n_joints)]
+    def columns(fingers: list[str], counts: list[int]) -> list[str]:
+        """Names of the numbers in `row`, for fingers with so many joints each."""
+        joints = joint_names(fingers, counts)
         return [
             *(f"measured_q_{joint}" for joint in joints),
             *(f"measured_tau_{joint}" for joint in joints),
@@ -83,13 +87,13 @@ class Sensors:
         """The measurement at time t, s. Call it once a control step, in order of time."""
         q_noise, pose_noise, place_noise, force_noise = self._noise.next()
         c = self._config
-        q = self._q.reshape(-1)
+        q = self._q
         q[:] = self._q_true
         if c.encoder_noise > 0.0:
             q += c.encoder_noise * q_noise
         if self._step > 0.0:
             q[:] = np.round(q / self._step) * self._step
-        self._tau.reshape(-1)[:] = self._force
+        self._tau[:] = self._force
         self._read_pose(t, pose_noise)
         self._read_touch(place_noise, force_noise)
         said = self._injection.read(t, self._q, self._tau, self.pose, self._place, self._normal_force)
@@ -133,6 +137,11 @@ class Sensors:
             normal = np.maximum(normal * (1.0 + c.contact_force_noise * force_noise) + force_bias, 0.0)
         self._place[:] = np.where(touching[:, None], self._radius * in_tip, 0.0)
         self._normal_force[:] = np.where(touching, normal, 0.0)
+
+
+def joint_names(fingers: list[str], counts: list[int]) -> list[str]:
+    """Names of the independent joints, finger by finger: the finger's and a number from 1 on."""
+    return [f"{name}_{i + 1}" for name, count in zip(fingers, counts, strict=True) for i in range(count)]
 
 
 class _Noise:

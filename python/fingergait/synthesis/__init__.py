@@ -7,6 +7,7 @@ from .dk import DKResult, Iteration, dk_iteration
 from .errors import InfeasibleSpecError, LibraryError, SpecError, SynthesisError
 from .identify import identify_damping
 from .mu import mu_bounds
+from .rate import at_rate
 from .spec import SynthesisSpec
 from .statespace import StateSpace
 from .synthesize import Controller, hand_tuned, synthesize
@@ -24,6 +25,7 @@ __all__ = [
     "StateSpace",
     "SynthesisError",
     "SynthesisSpec",
+    "at_rate",
     "dk_iteration",
     "hand_tuned",
     "identify_damping",

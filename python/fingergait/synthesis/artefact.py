@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fingergait.files import make_folder, write_text
+
 from .discretise import DiscreteController
 
 FORMAT = "fingergait-controller/1"
@@ -44,6 +46,7 @@ class Artefact:
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
+        """The JSON object, in the order of the file."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -58,8 +61,8 @@ class Artefact:
 
     def write(self, path: Path) -> None:
         """Writes the JSON text; numbers are exact (shortest text that reads back the same)."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        make_folder(path.parent)
+        write_text(path, json.dumps(self.as_dict(), indent=1, allow_nan=False) + "\n")
 
 
 def _matrices(K: DiscreteController) -> dict[str, list[list[float]]]:

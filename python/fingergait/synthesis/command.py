@@ -8,13 +8,20 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from .dk import Iteration
+from .rate import at_rate
 from .report import write_report
 from .spec import SynthesisSpec
 from .synthesize import Controller, synthesize
 
 
 def run_synthesize(
-    spec_path: str | Path, out: str | Path, as_json: bool = False, *, bodies: int = 2000, stream: TextIO | None = None
+    spec_path: str | Path,
+    out: str | Path,
+    as_json: bool = False,
+    *,
+    rate: float | None = None,
+    bodies: int = 2000,
+    stream: TextIO | None = None,
 ) -> dict[str, Any]:
     """Synthesises a controller, writes `out` and the report beside it, and returns the figures of the JSON output.
 
@@ -23,6 +30,7 @@ def run_synthesize(
     spec_path : TOML spec
     out : where the artefact goes; the report gets the same name with the suffix .html
     as_json : print the figures as one JSON object on standard output, and progress on standard error
+    rate : Hz, instead of the spec's, see `rate.at_rate`
     bodies : nonlinear bodies in the verification
     stream : where progress goes; None: standard error with `as_json`, else standard output
 
@@ -42,6 +50,14 @@ def run_synthesize(
         print(f"{axis:8} {step.gamma:9.4f} {step.mu_peak:9.4f} {step.order:6d}", file=progress, flush=True)
 
     spec = SynthesisSpec.load(spec_path)
+    if rate is not None:
+        spec = at_rate(spec, rate)
+        c = spec.control
+        print(
+            f"{c.rate_hz:g} Hz: delay {1e3 * c.delay:.3g} ms ({c.delay * c.rate_hz:g} samples, as in the spec), "
+            f"dead time with the hold {1e3 * c.dead_time:.3g} ms",
+            file=progress,
+        )
     controller = synthesize(
         spec, progress=iteration, note=lambda line: print(f"... {line}", file=progress, flush=True), bodies=bodies
     )

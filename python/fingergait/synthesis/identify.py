@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import lfilter, savgol_filter
 
 from fingergait.run.pose_error import pose_errors
 
@@ -46,6 +45,8 @@ def identify_damping(log: Log, scenario: Scenario, spec: SynthesisSpec) -> Array
     ValueError
         If the scenario has no pulse or the spec no hand.
     """
+    from scipy.signal import savgol_filter  # takes a second to import, and every command imports this module
+
     if not scenario.disturbance or spec.hand is None:
         raise ValueError("identify_damping: needs a scenario with [[disturbance]] pulses and a spec with a [hand]")
     t, dt = log.t, scenario.period
@@ -69,5 +70,7 @@ def identify_damping(log: Log, scenario: Scenario, spec: SynthesisSpec) -> Array
 
 def _lagged(command: ArrayLike, lag: float, dt: float) -> Array:
     """The motors' torque at each sample, from commands (T, 6) held from sample to sample; a first-order lag, s."""
+    from scipy.signal import lfilter
+
     pole = np.exp(-dt / lag) if lag > 0.0 else 0.0
     return np.asarray(lfilter([0.0, 1.0 - pole], [1.0, -pole], np.asarray(command, dtype=float), axis=0))

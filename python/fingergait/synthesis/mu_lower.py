@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .blocks import Block
+from .scale import normalised
 from .statespace import Array, ComplexArray
 
 
@@ -19,9 +20,12 @@ def lower_bound(M: ComplexArray, blocks: Sequence[Block], iterations: int = 60) 
     of M Delta is a lower bound whether or not the iteration has converged. With real blocks: the real scalars are
     swept, see `_mixed`.
     """
+    N, exponents = normalised(M)
     if any(b.kind == "real" for b in blocks):
-        return np.array([_mixed(m, blocks) for m in M])
-    return _complex(M, blocks, iterations, n_starts=6)
+        bound = np.array([_mixed(m, blocks) for m in N])
+    else:
+        bound = _complex(N, blocks, iterations, n_starts=6)
+    return np.asarray(np.ldexp(bound, exponents))
 
 
 def _unit(v: ComplexArray) -> ComplexArray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blocks import Block, shape
+from .scale import normalised
 from .statespace import Array, ComplexArray
 
 _ZERO = 1e-14  # t below this, for a matrix of norm one, counts as zero
@@ -132,6 +133,7 @@ def upper_bound(
     """
     n_w = M.shape[0]
     _, n_in = shape(blocks)
+    M, exponents = normalised(M)
     d = osborne(M, blocks)
     left = np.concatenate([np.repeat(d[:, i, None], b.c, axis=1) for i, b in enumerate(blocks)], axis=1)
     right = np.concatenate([np.repeat(d[:, i, None], b.r, axis=1) for i, b in enumerate(blocks)], axis=1)
@@ -171,8 +173,9 @@ def upper_bound(
     Dw = assemble(best_x, Ew)
     Dz = assemble(best_x, Ez)
     G = assemble(best_x, Eg)
-    value = np.sqrt(np.maximum(best, 0.0)) * scale
-    # back to the scaling of M itself: N = left M right^-1 / scale
+    value = np.ldexp(np.sqrt(np.maximum(best, 0.0)) * scale, exponents)
+    # back to the scaling of M itself: N = left M right^-1 / scale / 2^exponents
+    scale = np.ldexp(scale, exponents)
     return Scalings(
         value,
         right[:, :, None] * Dw * right[:, None, :],

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 
+from fingergait.files import write_text
+
 from . import plots
 from .analysis import Problem, mu_curve
 from .certificate import breaks_at
@@ -117,6 +119,4 @@ def render(controller: Controller) -> str:
 
 def write_report(controller: Controller, path: str | Path) -> None:
     """Writes the report."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(render(controller), encoding="utf-8")
+    write_text(Path(path), render(controller))

@@ -49,10 +49,12 @@ class StateSpace:
 
     @property
     def n_inputs(self) -> int:
+        """Number of inputs."""
         return int(self.D.shape[1])
 
     @property
     def n_outputs(self) -> int:
+        """Number of outputs."""
         return int(self.D.shape[0])
 
     @property

@@ -10,6 +10,7 @@ impl DualStagePlanner {
     /// Returns to the state after construction.
     pub fn reset(&mut self) {
         self.guard.reset();
+        self.fit(self.given.clone());
         self.grasp = Grasp::new(&self.hand, self.config.gait.contact_force);
         self.quality.reset();
         self.supervisor.reset();
@@ -20,6 +21,8 @@ impl DualStagePlanner {
         self.assume_friction();
         self.planner.reset();
         self.velocity_force.reset(0.0);
+        self.robust.forget();
+        self.regrasp.reset();
         self.posture.reset();
         self.limiter.reset();
         self.command.tau.fill(0.0);
@@ -60,11 +63,11 @@ impl DualStagePlanner {
             let F_des = self.robust.wrench(reference, &measurement.X_WO);
             if F_des.iter().all(|F| F.abs() < 1e6) {
                 self.steady.take(&F_des);
-                return F_des;
+                return F_des * self.regrasp.share();
             }
             self.robust.reset();
         }
-        *self.steady.wrench()
+        self.steady.wrench() * self.regrasp.share()
     }
 
     /// Lets go of fingers of which neither angles nor contact are known.

@@ -2,6 +2,7 @@
 
 use super::DualStagePlanner;
 use crate::manipulation::force::ForceStatus;
+use crate::regrasp::phase::Phase;
 use crate::safety::guard::Outcome;
 use nalgebra::Vector6;
 
@@ -11,6 +12,9 @@ impl DualStagePlanner {
         let d = &mut self.diagnostics;
         d.phase = self.supervisor.phase();
         d.free_finger = self.supervisor.free_finger();
+        d.regrasp = self.regrasp.phase();
+        d.set_downs = self.regrasp.count();
+        d.governed = *self.regrasp.reference();
         d.gaits = self.supervisor.gaits();
         d.last_end = self.supervisor.last_end();
         d.threshold = self.supervisor.threshold().unwrap_or(f64::NAN);
@@ -29,14 +33,15 @@ impl DualStagePlanner {
         d.tau.copy_from(&self.command.tau);
     }
 
-    /// Tells the guard how the step went; `at_limit`: some torque is.
-    pub(super) fn report(&mut self, at_limit: bool) {
+    /// Tells the guard how the step went.
+    pub(super) fn report(&mut self) {
         let mut bounds = self.tau_min.iter().zip(self.tau_max.iter());
         self.guard.note(Outcome {
             solved: self.diagnostics.status == ForceStatus::Solved,
             box_empty: bounds.any(|(low, high)| *low > 0.0 || *high < 0.0),
-            saturated: at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
-            overdue: self.supervisor.overdue(),
+            saturated: self.at_limit || self.overload(&self.psi_filtered) > self.config.gait.abort_factor,
+            overdue: self.supervisor.overdue() && self.regrasp.phase() == Phase::Idle,
+            aground: matches!(self.regrasp.phase(), Phase::Stand | Phase::Rest),
         });
     }
 }

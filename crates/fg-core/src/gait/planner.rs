@@ -53,6 +53,11 @@ impl GaitPlanner {
         }
     }
 
+    /// Takes the lengths that fit the grasp.
+    pub fn fit(&mut self, config: &GaitConfig) {
+        self.config = config.clone();
+    }
+
     /// Desired joint velocities of the free finger, rad/s; zero behind its last joint, where other fingers have more.
     pub fn qd_des(&self) -> &[f64] {
         &self.qd_des

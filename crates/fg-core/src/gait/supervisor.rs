@@ -235,6 +235,16 @@ impl Supervisor {
         self.since_refusal = 0.0;
     }
 
+    /// All fingers are off the object on purpose: none is lost, and no gait goes on.
+    pub fn pause(&mut self) {
+        if self.phase != Phase::Hold {
+            self.enter(Phase::Hold);
+        }
+        self.touching = 0.0;
+        self.waiting = 0.0;
+        self.off.fill(0.0);
+    }
+
     /// Ends a gait early: a finger that slides presses, one that is being unloaded is loaded again.
     pub fn abort(&mut self) {
         match self.phase {

@@ -146,6 +146,8 @@ pub struct RobustController {
     dt: f64,
     /// Force that holds the object's nominal weight, N: what the linearisation compensates.
     lift: Vector3<f64>,
+    /// What else K was found to ask for in the steady state, N and N m.
+    learnt: Vector6<f64>,
     e: Vector6<f64>,
     u: Vector6<f64>,
     V_WD: Vector6<f64>,
@@ -169,13 +171,42 @@ impl RobustController {
         }
         let lift = -g_W * mass.unwrap_or(K.nominal.mass);
         let zero = Vector6::zeros();
-        Ok(Self { K, config: config.clone(), dt, lift, e: zero, u: zero, V_WD: zero, filtered: None })
+        Ok(Self {
+            K,
+            config: config.clone(),
+            dt,
+            lift,
+            learnt: zero,
+            e: zero,
+            u: zero,
+            V_WD: zero,
+            filtered: None,
+        })
     }
 
     /// Returns to rest.
     pub fn reset(&mut self) {
         self.K.reset();
         self.filtered = None;
+    }
+
+    /// Nominal weight of the object, N.
+    pub fn weight(&self) -> f64 {
+        self.lift.norm()
+    }
+
+    /// Takes the wrench `F` at which the object has been at rest for what holds it from here on: K, which starts at rest
+    /// with each grasp, need not find the weight and its place anew.
+    pub fn learn(&mut self, F: &Vector6<f64>) {
+        self.learnt = *F;
+        for (learnt, lift) in self.learnt.iter_mut().zip(&self.lift) {
+            *learnt -= lift;
+        }
+    }
+
+    /// Forgets what [`RobustController::learn`] took.
+    pub fn forget(&mut self) {
+        self.learnt = Vector6::zeros();
     }
 
     /// Pose error of the last step against the filtered reference, m and rad.
@@ -197,7 +228,7 @@ impl RobustController {
         let X_WD = self.filter(reference, X_WO);
         self.e = pose_error(&X_WD, X_WO);
         self.u = self.K.output(&self.e);
-        let mut F = self.u.component_mul(&self.beta());
+        let mut F = self.u.component_mul(&self.beta()) + self.learnt;
         for (F, lift) in F.iter_mut().zip(&self.lift) {
             *F += lift;
         }

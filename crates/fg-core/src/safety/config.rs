@@ -31,6 +31,8 @@ pub struct SafetyConfig {
     pub stuck_angle: f64,
     /// Object and reference are no farther than this from the fingertips' mean, m.
     pub reach: f64,
+    /// The first pose lies within this many times the contacts' radius, their largest distance from their mean, of that mean.
+    pub pose_spread: f64,
     /// The pose jumps when it departs from the motion that the fingers tell by more than this, m and rad ...
     pub pose_jump: [f64; 2],
     /// ... plus these speeds times the time since its last good value, m/s and rad/s.
@@ -52,6 +54,19 @@ pub struct SafetyConfig {
     pub lost_distance: f64,
     /// ... and its sensor when it has not after this time, s.
     pub lost_time: f64,
+    /// A finger that looks for the surface is on its way while it advances by this in 0.4 s, m.
+    pub pressing_distance: f64,
+    /// Joint angles that were refused are right when they explain the finger's contact to within this, m: fingers roll and
+    /// creep a little.
+    pub relearn_distance: f64,
+    /// Length that weighs turns against displacements in the pose's noise, m.
+    pub pose_arm: f64,
+    /// Noise of the pose that no controller minds, m: a sensor with less is used as it is.
+    pub pose_quiet: f64,
+    /// Most tactile sensors are wrong when they differ from what the joint torques tell by more than this, N ...
+    pub effort_margin: f64,
+    /// ... and this share of the larger of the two.
+    pub effort_ratio: f64,
     /// A motor is dead when its joint, asked for more torque than this, N m ...
     pub motor_asked: f64,
     /// ... gives less than this, N m ...
@@ -87,6 +102,7 @@ impl Default for SafetyConfig {
             stuck_distance: 3e-3,
             stuck_angle: 0.15,
             reach: 1.0,
+            pose_spread: 2.0,
             pose_jump: [5e-3, 0.1],
             pose_speed: [0.5, 5.0],
             pose_timeout: 0.1,
@@ -97,6 +113,12 @@ impl Default for SafetyConfig {
             loaded_force: 0.3,
             lost_distance: 2e-3,
             lost_time: 0.05,
+            pressing_distance: 1e-3,
+            relearn_distance: 4e-3,
+            pose_arm: 0.03,
+            pose_quiet: 3e-5,
+            effort_margin: 0.3,
+            effort_ratio: 0.6,
             motor_asked: 0.08,
             motor_given: 0.03,
             motor_time: 0.01,
@@ -127,6 +149,7 @@ impl SafetyConfig {
             ("stuck_distance", self.stuck_distance, positive, 1.0),
             ("stuck_angle", self.stuck_angle, positive, 10.0),
             ("reach", self.reach, positive, 100.0),
+            ("pose_spread", self.pose_spread, 1.0, 1e6),
             ("pose_jump[0]", self.pose_jump[0], positive, 1.0),
             ("pose_jump[1]", self.pose_jump[1], positive, 3.2),
             ("pose_speed[0]", self.pose_speed[0], positive, 100.0),
@@ -140,6 +163,12 @@ impl SafetyConfig {
             ("loaded_force", self.loaded_force, 0.0, 1e3),
             ("lost_distance", self.lost_distance, positive, 1.0),
             ("lost_time", self.lost_time, 0.0, 60.0),
+            ("pressing_distance", self.pressing_distance, positive, 1.0),
+            ("relearn_distance", self.relearn_distance, positive, 1.0),
+            ("pose_arm", self.pose_arm, positive, 10.0),
+            ("pose_quiet", self.pose_quiet, positive, 1.0),
+            ("effort_margin", self.effort_margin, 0.0, 1e6),
+            ("effort_ratio", self.effort_ratio, 0.0, 1e3),
             ("motor_asked", self.motor_asked, self.motor_given, 1e6),
             ("motor_given", self.motor_given, positive, 1e6),
             ("motor_time", self.motor_time, 0.0, 60.0),

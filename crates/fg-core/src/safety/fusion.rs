@@ -12,18 +12,13 @@ use nalgebra::{Isometry3, Vector6};
 
 /// Time constant over which the noise of both sources is learnt, s.
 const MEMORY: f64 = 0.5;
-/// Length that weighs turns against displacements in the noise, m: about the object's radius.
-const ARM: f64 = 0.03;
-/// Noise that no K minds, m: a sensor with less is used as it is.
-const QUIET: f64 = 3e-5;
 /// Samples that come less often than this many periods are slow, however little noise is in them.
 const SLOW: f64 = 2.5;
 
 /// See the module.
 #[derive(Debug, Clone)]
 pub struct Fusion {
-    /// Time constant with which the carried pose follows the sensor, at most, s; zero: the sensor's pose.
-    time: f64,
+    config: SafetyConfig,
     dt: f64,
     out: Option<Isometry3<f64>>,
     /// The last two samples' worth of motion: the last sample, and the increments by sensor and fingers up to it.
@@ -43,7 +38,7 @@ impl Fusion {
     pub fn new(config: &SafetyConfig, dt: f64) -> Self {
         let zero = Vector6::zeros();
         Self {
-            time: config.pose_filter,
+            config: config.clone(),
             dt,
             out: None,
             sample: None,
@@ -54,6 +49,11 @@ impl Fusion {
             noise_sensor: 0.0,
             noise_fingers: 0.0,
         }
+    }
+
+    /// Takes the lengths that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
     }
 
     /// Forgets the past.
@@ -71,7 +71,7 @@ impl Fusion {
         motion: Option<&Vector6<f64>>,
         fresh: bool,
     ) -> Isometry3<f64> {
-        let (Some(motion), Some(out), true) = (motion, self.out, self.time > 0.0) else {
+        let (Some(motion), Some(out), true) = (motion, self.out, self.config.pose_filter > 0.0) else {
             self.out = Some(*X);
             self.sample = None;
             return *X;
@@ -82,8 +82,9 @@ impl Fusion {
         if fresh {
             self.learn(X);
             let slow = if self.age > SLOW * self.dt { 0.5 } else { 0.0 };
-            let share = self.noise_sensor / (self.noise_sensor + self.noise_fingers + QUIET * QUIET);
-            let time = self.time * share.max(slow);
+            let share =
+                self.noise_sensor / (self.noise_sensor + self.noise_fingers + self.config.pose_quiet.powi(2));
+            let time = self.config.pose_filter * share.max(slow);
             let follow = 1.0 - (-self.age / time.max(1e-9)).exp();
             out = if time > 0.2 * self.dt { moved(&out, &(pose_error(X, &out) * follow)) } else { *X };
             self.age = 0.0;
@@ -100,7 +101,7 @@ impl Fusion {
             let follow = 1.0 - (-self.age / MEMORY).exp();
             let square = |change: Vector6<f64>| {
                 let [p, r] = size(&change);
-                p * p + (ARM * r).powi(2)
+                p * p + (self.config.pose_arm * r).powi(2)
             };
             self.noise_sensor += (square(by_sensor - self.by_sensor) - self.noise_sensor) * follow;
             self.noise_fingers += (square(self.since - self.by_fingers) - self.noise_fingers) * follow;

@@ -3,6 +3,8 @@
 use super::clock::{Clock, Tick};
 use super::config::SafetyConfig;
 use super::debounce::Debounce;
+use super::effort::{EffortGuard, Efforts};
+use super::frame::{FrameGuard, Verdict};
 use super::joints::{self, JointGuard};
 use super::motors::MotorGuard;
 use super::odometry::Odometry;
@@ -13,7 +15,7 @@ use super::{Fault, Faults, SafeMode};
 use crate::error::Error;
 use crate::hand::{HandModel, HandState};
 use crate::signals::{Measurement, Reference};
-use nalgebra::Isometry3;
+use nalgebra::{DMatrix, Isometry3};
 
 /// Time constant with which the fingers press harder and let off again, s.
 const SQUEEZE_TIME: f64 = 0.02;
@@ -42,13 +44,26 @@ pub struct Plan<'a> {
     pub qd_des: Option<&'a [f64]>,
     /// The free finger looks for the surface.
     pub pressing: bool,
+    /// Desired joint velocities, rad/s, while the object lies and all fingers are off it, or may be.
+    pub open: Option<&'a [f64]>,
     /// There has been a first grasp.
     pub grasped: bool,
+    /// Torques that the fingers needed for their own weight and motion, N m.
+    pub own: &'a [f64],
+    /// Hand Jacobian in the contact frames.
+    pub J: &'a DMatrix<f64>,
+}
+
+impl Plan<'_> {
+    /// True where finger `j` is off the object on purpose.
+    fn frees(&self, j: usize) -> bool {
+        self.open.is_some() || self.free == Some(j)
+    }
 }
 
 /// How the control step went.
 #[derive(Debug, Clone, Copy, Default)]
-#[allow(clippy::struct_excessive_bools)] // four facts that do not depend on each other
+#[allow(clippy::struct_excessive_bools)] // five facts that do not depend on each other
 pub struct Outcome {
     /// The contact forces are certified.
     pub solved: bool,
@@ -58,6 +73,8 @@ pub struct Outcome {
     pub saturated: bool,
     /// The grasp has grown bad, and no finger can be freed.
     pub overdue: bool,
+    /// The object was set down for good, or cannot be.
+    pub aground: bool,
 }
 
 /// Conditions of the whole step that must last before they count.
@@ -68,6 +85,7 @@ struct Conditions {
     solver: Debounce,
     saturated: Debounce,
     overdue: Debounce,
+    aground: Debounce,
     gone: Debounce,
     seeking: Debounce,
 }
@@ -80,9 +98,11 @@ pub struct Guard {
     clock: Clock,
     joints: JointGuard,
     touch: TouchGuard,
+    effort: EffortGuard,
     motors: MotorGuard,
     odometry: Odometry,
     pose: PoseGuard,
+    frame: FrameGuard,
     reference: ReferenceGuard,
     conditions: Conditions,
     faults: Faults,
@@ -104,9 +124,11 @@ impl Guard {
             clock: Clock::new(config, dt),
             joints: JointGuard::new(hand, config, dt),
             touch: TouchGuard::new(hand.n_fingers(), config, contact_force, dt),
+            effort: EffortGuard::new(hand.n_fingers(), config, dt),
             motors: MotorGuard::new((0..hand.n_fingers()).map(|j| hand.joints(j)).collect(), config, dt),
             odometry: Odometry::new(hand, dt),
             pose: PoseGuard::new(config, dt),
+            frame: FrameGuard::new(hand.n_fingers(), config),
             reference: ReferenceGuard::new(config, dt),
             conditions: Conditions::default(),
             faults: Faults::default(),
@@ -121,14 +143,25 @@ impl Guard {
         }
     }
 
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
+        self.joints.fit(config);
+        self.touch.fit(config);
+        self.effort.fit(config);
+        self.pose.fit(config);
+    }
+
     /// Forgets the past. Allocates nothing.
     pub fn reset(&mut self) {
         self.clock.reset();
         self.joints.reset();
         self.touch.reset();
+        self.effort.reset();
         self.motors.reset();
         self.odometry.reset();
         self.pose.reset();
+        self.frame.reset();
         self.reference.reset();
         self.conditions = Conditions::default();
         self.faults = Faults::default();
@@ -278,14 +311,18 @@ impl Guard {
         self.faults.insert_if(saturated, Fault::Saturated);
         let overdue = self.conditions.overdue.update(outcome.overdue, dt, 0.0, c.recovery_time);
         self.faults.insert_if(overdue, Fault::Overdue);
+        let aground = self.conditions.aground.update(outcome.aground, dt, 0.0, c.recovery_time);
+        self.faults.insert_if(aground, Fault::Aground);
     }
 
     fn admit_joints(&mut self, measurement: &Measurement, elapsed: f64, plan: &Plan<'_>, state: &HandState) {
         let (tactile, motors) = (&self.trusted.tactile, &self.motors);
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let touching = tactile[j].f_n > 0.0;
-            joints::Use { touching, holding: !free && motors.drives(j), qd_des: plan.qd_des.filter(|_| free) }
+            let swinging = plan.open.map(|qd_des| &qd_des[state.joints(j)]);
+            let qd_des = swinging.or(plan.qd_des.filter(|_| free));
+            joints::Use { touching, holding: !free && motors.drives(j), qd_des }
         };
         let (q, odometry) = (measurement.q.as_slice(), &self.odometry);
         let trusted = self.trusted.q.as_mut_slice();
@@ -310,13 +347,23 @@ impl Guard {
     ) {
         let motors = &self.motors;
         let using = |j: usize| {
-            let free = plan.free == Some(j);
+            let free = plan.frees(j);
             let drives = motors.drives(j);
-            touch::Use { drives, holding: !free, pressing: free && plan.pressing, f_n: plan.f[3 * j + 2] }
+            touch::Use {
+                drives,
+                open: plan.open.is_some(),
+                holding: !free,
+                pressing: free && plan.pressing,
+                f_n: plan.f[3 * j + 2],
+            }
         };
         let at = touch::Where { hand, state, X_WO: &self.trusted.X_WO };
         let (tactile, trusted) = (&measurement.tactile, &mut self.trusted.tactile);
         self.touch.admit(tactile, elapsed, at, using, trusted, &mut self.faults);
+        let efforts = Efforts { tau: measurement.tau.as_slice(), own: plan.own, J: plan.J };
+        let holds = |j: usize| !plan.frees(j) && motors.drives(j) && self.joints.trusts(j);
+        self.effort.admit(tactile, &efforts, |j| hand.joints(j), holds);
+        self.faults.insert_if(self.effort.failed(), Fault::TactileScale);
     }
 
     fn admit_pose(
@@ -328,13 +375,24 @@ impl Guard {
         state: &HandState,
     ) {
         let (joints, motors) = (&self.joints, &self.motors);
-        let sticks = |j: usize| plan.free != Some(j) && joints.trusts(j) && motors.drives(j);
+        let sticks = |j: usize| !plan.frees(j) && joints.trusts(j) && motors.drives(j);
         let motion = self.odometry.motion(hand, state, &self.trusted.tactile, sticks);
         let centre = self.odometry.centre(state);
         let X_WO = &measurement.X_WO;
         let X_WO = self.pose.admit(X_WO, motion.as_ref(), &centre, elapsed, &mut self.faults);
         self.trusted.X_WO = X_WO;
         self.odometry.settle(self.pose.sensed(), self.pose.from_sensor());
+        if !plan.grasped && self.joints.known() {
+            self.frame.admit(hand, state, &self.trusted.tactile, self.pose.sensed());
+            let verdict = self.frame.verdict();
+            self.faults.insert_if(verdict == Verdict::PoseElsewhere, Fault::PoseFrame);
+            self.faults.insert_if(verdict == Verdict::NormalsOutwards, Fault::TactileAxes);
+            if verdict != Verdict::Fits {
+                // The next pose is the first one again: there is nothing that it could have jumped from.
+                self.pose.reset();
+                self.odometry.reset();
+            }
+        }
         self.blind = self.pose.failed() && motion.is_none();
     }
 
@@ -346,7 +404,7 @@ impl Guard {
         let fingers = self.trusted.tactile.len();
         let touching = self.trusted.tactile.iter().filter(|reading| reading.f_n > 0.0).count();
         let enough = if conditions.gone.confirmed() { 2 } else { 1 };
-        let gone = plan.grasped && touching < enough;
+        let gone = plan.grasped && plan.open.is_none() && touching < enough;
         let gone = conditions.gone.update(gone, dt, c.contacts_timeout, c.recovery_time);
         self.faults.insert_if(gone, Fault::ContactsLost);
         let seeks = |j: usize| plan.pressing && self.trusted.tactile[j].f_n <= 0.0 && self.motors.drives(j);
@@ -357,11 +415,16 @@ impl Guard {
             || seeking
             || conditions.solver.confirmed()
             || self.touch.failed()
+            || self.effort.failed()
             || self.motors.failed()
             || late
             || (0..fingers).any(|j| !self.joints.trusts(j));
         let strained = conditions.saturated.confirmed() || conditions.overdue.confirmed();
-        let mut mode = if slow || strained { SafeMode::Hold } else { SafeMode::Normal };
+        let mut mode = if slow || strained || conditions.aground.confirmed() {
+            SafeMode::Hold
+        } else {
+            SafeMode::Normal
+        };
         if self.blind || self.pose.failed() {
             mode = SafeMode::Squeeze;
         }
@@ -376,7 +439,7 @@ impl Guard {
         if self.damped.contains(&true) {
             mode = SafeMode::Damp;
         }
-        if gone || !(self.joints.known() && self.pose.known()) {
+        if gone || self.frame.verdict() != Verdict::Fits || !(self.joints.known() && self.pose.known()) {
             mode = SafeMode::Stop;
         }
         self.allows_gaits = !slow && mode <= SafeMode::Hold;

@@ -48,6 +48,8 @@ pub struct JointGuard {
     failed: Vec<Debounce>,
     refused: Vec<Refused>,
     samples: u32,
+    /// For how long nothing has been read, s.
+    unread: f64,
     dt: f64,
 }
 
@@ -74,8 +76,14 @@ impl JointGuard {
             failed: vec![Debounce::default(); hand.n_fingers()],
             refused: vec![Refused::default(); hand.n_fingers()],
             samples: 0,
+            unread: 0.0,
             dt,
         }
+    }
+
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
     }
 
     /// Forgets the past.
@@ -86,6 +94,7 @@ impl JointGuard {
         self.failed.iter_mut().for_each(Debounce::reset);
         self.refused.iter_mut().for_each(Refused::reset);
         self.samples = 0;
+        self.unread = 0.0;
     }
 
     /// True once every joint has had a good sample.
@@ -116,6 +125,11 @@ impl JointGuard {
         trusted: &mut [f64],
         faults: &mut Faults,
     ) {
+        if is_unread(q) {
+            self.skip(q, elapsed, faults);
+            return;
+        }
+        self.unread = 0.0;
         let settled = self.samples >= SETTLE;
         self.samples = self.samples.saturating_add(1);
         for j in 0..self.failed.len() {
@@ -132,7 +146,7 @@ impl JointGuard {
                 let joints = &self.joints[at.clone()];
                 let turns = |i: usize| joints[i].turn();
                 let refused = &mut self.refused[j];
-                if refused.explains(j, turns, held, elapsed, state, odometry) {
+                if refused.explains(j, turns, held, elapsed, state, odometry, self.config.relearn_distance) {
                     self.joints[at.clone()].iter_mut().for_each(Joint::believe);
                     bad = false;
                 }
@@ -152,6 +166,28 @@ impl JointGuard {
         }
     }
 
+    /// Whether more than half of the hand's encoders have read the same numbers for long: then the fingers' motion says nothing.
+    fn stands_still(&self) -> bool {
+        2 * self.joints.iter().filter(|joint| joint.still > self.config.stuck_time).count()
+            > self.joints.len()
+    }
+
+    /// Takes a sample that was not read: the last good angles go on, and the fingers are trusted for a short while.
+    fn skip(&mut self, q: &[f64], elapsed: f64, faults: &mut Faults) {
+        faults.insert(Fault::Encoder);
+        for (joint, q) in self.joints.iter_mut().zip(q) {
+            joint.raw = *q;
+            joint.missing = (joint.missing + elapsed).min(UNSEEN);
+        }
+        self.unread += elapsed;
+        // A read that fails now and then is no failure, however often: the next one tells all.
+        if self.unread > self.config.ride_through {
+            for failed in &mut self.failed {
+                failed.update(true, self.dt, 0.0, self.config.recovery_time);
+            }
+        }
+    }
+
     /// Whether a joint of finger `j` reads the same number although the finger moves.
     ///
     /// A finger that slips moves against the object too. What tells the two apart is the direction: a stuck joint leaves out
@@ -160,7 +196,9 @@ impl JointGuard {
         let c = &self.config;
         let drift = odometry.drift(j);
         let length = drift.norm();
-        let drifts = using.holding && length > c.stuck_distance && length > 3.0 * odometry.drift_of_others(j);
+        let whole = self.stands_still();
+        let alone = whole || length > 3.0 * odometry.drift_of_others(j);
+        let drifts = using.holding && length > c.stuck_distance && alone;
         let first = self.fingers[j].start;
         let joints = &mut self.joints[self.fingers[j].clone()];
         let all = joints.iter().all(|joint| joint.still > c.stuck_time);
@@ -179,6 +217,14 @@ impl JointGuard {
         }
         stuck
     }
+}
+
+/// Whether nobody has read the encoders: at least half of the hand's angles, and two of them, are zero to the last bit.
+///
+/// So is a buffer that was never filled. A joint that happens to stand at zero behind a coarse encoder is one of few.
+fn is_unread(q: &[f64]) -> bool {
+    let zeros = q.iter().filter(|q| **q == 0.0).count();
+    zeros >= 2 && 2 * zeros >= q.len()
 }
 
 impl Joint {

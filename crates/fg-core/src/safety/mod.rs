@@ -9,12 +9,14 @@
 //! | [`clock`] | the time of the measurement |
 //! | [`joints`] | encoders |
 //! | [`touch`] | tactile sensors |
+//! | [`effort`] | all tactile sensors together, by the joint torques |
 //! | [`motors`] | motors, by the torques that they give |
 //! | [`odometry`] | nothing: the object's motion, as the fingers that stick to it tell it |
+//! | [`frame`] | the first pose and the first normals, against the touching tips |
 //! | [`pose`] | the object's pose, against that motion |
 //! | [`fusion`] | nothing: the pose between the sensor's samples, and behind their noise |
 //! | [`relearn`] | joint angles that are refused: whether they are right after all |
-//! | [`reference`] | the desired motion, and where it stands while the mode is not normal |
+//! | [`mod@reference`] | the desired motion, and where it stands while the mode is not normal |
 //! | [`guard`] | the whole measurement; the mode |
 //! | [`steady`] | nothing: the wrench that goes on without feedback |
 //! | [`limiter`] | the torque command |
@@ -22,6 +24,8 @@
 pub mod clock;
 pub mod config;
 pub mod debounce;
+pub mod effort;
+pub mod frame;
 pub mod fusion;
 pub mod guard;
 pub mod joints;
@@ -75,11 +79,19 @@ pub enum Fault {
     FingerLost = 17,
     /// The grasp has grown bad, and no finger can be freed to mend it.
     Overdue = 18,
+    /// The first pose does not fit the touching fingertips: another frame, or another object.
+    PoseFrame = 19,
+    /// Most tactile sensors feel something else than the joint torques press with.
+    TactileScale = 20,
+    /// The normals of the first contacts point away from each other: axes are swapped, or a sign is wrong.
+    TactileAxes = 21,
+    /// The object cannot be taken again, or not be set down: it lies and is left alone, or is held where it is.
+    Aground = 22,
 }
 
 impl Fault {
     /// Every fault, in the order of its bits.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 23] = [
         Self::Clock,
         Self::Late,
         Self::Encoder,
@@ -99,6 +111,10 @@ impl Fault {
         Self::Motor,
         Self::FingerLost,
         Self::Overdue,
+        Self::PoseFrame,
+        Self::TactileScale,
+        Self::TactileAxes,
+        Self::Aground,
     ];
 
     /// The name used in logs.
@@ -123,6 +139,10 @@ impl Fault {
             Self::Motor => "motor",
             Self::FingerLost => "finger_lost",
             Self::Overdue => "overdue",
+            Self::PoseFrame => "pose_frame",
+            Self::TactileScale => "tactile_scale",
+            Self::TactileAxes => "tactile_axes",
+            Self::Aground => "aground",
         }
     }
 }
@@ -188,6 +208,9 @@ pub enum SafeMode {
 }
 
 impl SafeMode {
+    /// Every mode, from the mildest on.
+    pub const ALL: [Self; 5] = [Self::Normal, Self::Hold, Self::Squeeze, Self::Damp, Self::Stop];
+
     /// The name used in logs.
     pub fn as_str(self) -> &'static str {
         match self {

@@ -77,6 +77,12 @@ impl PoseGuard {
         }
     }
 
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
+        self.fusion.fit(config);
+    }
+
     /// Forgets the past.
     pub fn reset(&mut self) {
         *self = Self::new(&self.config, self.dt);

@@ -12,9 +12,7 @@ use nalgebra::{Isometry3, Point3};
 
 /// The angles must explain the contact for this long, s ...
 const TIME: f64 = 0.3;
-/// ... to within this, m: fingers roll and creep a little ...
-const DISTANCE: f64 = 4e-3;
-/// ... and to within this share of what the last good angles leave unexplained: a small jump moves the tip by little.
+/// ... to within `safety.relearn_distance` and this share of what the last good angles leave unexplained: a small jump moves the tip by little.
 const SHARE: f64 = 0.5;
 
 /// The point is at least so old when the angles jump, and at most twice as old, s.
@@ -65,7 +63,8 @@ impl Refused {
     /// Takes a step of `elapsed` seconds in which angles of finger `j` are refused; true where they are right after all.
     ///
     /// `turns(i)` is what the sample has over the last good angle of the finger's joint `i`, rad; None where it has no angle.
-    /// `state` and `odometry` are those of the last step, on the last good angles.
+    /// `state` and `odometry` are those of the last step, on the last good angles; `distance`, m, is what they may be off by.
+    #[allow(clippy::too_many_arguments, reason = "one call, all of it needed")]
     pub fn explains(
         &mut self,
         j: usize,
@@ -74,6 +73,7 @@ impl Refused {
         elapsed: f64,
         state: &HandState,
         odometry: &Odometry,
+        distance: f64,
     ) -> bool {
         let Some(X_WO) = odometry.pose() else { return false };
         if !holding {
@@ -86,7 +86,7 @@ impl Refused {
             self.agrees = 0.0;
             return false;
         };
-        let agrees = (found - expected).norm() < DISTANCE.min(SHARE * (good - expected).norm());
+        let agrees = (found - expected).norm() < distance.min(SHARE * (good - expected).norm());
         self.agrees = if agrees { self.agrees + elapsed } else { 0.0 };
         self.agrees > TIME
     }

@@ -11,14 +11,15 @@ use nalgebra::{Isometry3, Point3, Vector3};
 const FILTER: f64 = 0.01;
 /// A finger that presses, feels nothing and does not advance for this long has lost its sensor, s.
 const PRESSES: f64 = 0.4;
-/// Advance within that time that shows that it is on its way, m.
-const ON_ITS_WAY: f64 = 1e-3;
 
 /// What the last step knew about one finger.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 pub struct Use {
     /// False where the finger's motors give no torque: it lies where it lies.
     pub drives: bool,
+    /// True where all fingers are off the object on purpose, or about to be: none of them need feel anything.
+    pub open: bool,
     /// True where the force optimiser gives the finger its force.
     pub holding: bool,
     /// True where the finger looks for the surface.
@@ -92,6 +93,11 @@ impl TouchGuard {
             failed: Debounce::default(),
         };
         Self { config: config.clone(), dt, contact_force, tips: vec![tip; n] }
+    }
+
+    /// Takes the thresholds that fit the grasp.
+    pub fn fit(&mut self, config: &SafetyConfig) {
+        self.config = config.clone();
     }
 
     /// Forgets the past.
@@ -193,15 +199,17 @@ impl Tip {
         c: &SafetyConfig,
         elapsed: f64,
     ) -> bool {
-        if reading.f_n > threshold || !using.drives {
+        if reading.f_n > threshold || !using.drives || using.open {
             self.gone = false;
             self.pressing = None;
             return false;
         }
-        if using.pressing && self.replaced.is_none() && self.good.is_some() {
+        // A finger that has never felt anything, and is told to press, is on its way or has no sensor.
+        let first = self.good.is_none() && using.holding && using.f_n > threshold;
+        if (using.pressing || first) && self.replaced.is_none() && (self.good.is_some() || first) {
             let (time, here) = self.pressing.unwrap_or_else(|| (0.0, self.mark(j, at)));
             let here = here.moved(j, at, elapsed);
-            self.pressing = (here.by.abs() < ON_ITS_WAY).then_some((time + elapsed, here));
+            self.pressing = (here.by.abs() < c.pressing_distance).then_some((time + elapsed, here));
             return time > PRESSES;
         }
         self.pressing = None;
@@ -242,7 +250,9 @@ impl Tip {
 impl Advance {
     fn moved(self, j: usize, at: Where<'_>, elapsed: f64) -> Self {
         let p_OF = at.X_WO.inverse_transform_point(&Point3::from(at.state.tip(j).translation.vector));
-        let now = self.n_O.dot(&(p_OF - self.p_OF));
+        let way = p_OF - self.p_OF;
+        // Where the surface faces is not known before the first contact: any way will do.
+        let now = if self.n_O == Vector3::zeros() { way.norm() } else { self.n_O.dot(&way) };
         let by = self.by + (now - self.by) * (1.0 - (-elapsed / FILTER).exp());
         Self { by, time: self.time + elapsed, ..self }
     }

@@ -16,18 +16,16 @@ use super::working_set::{bound, Active, Entry, Equalities, Weights};
 pub enum Outcome {
     /// All rows hold and all multipliers are >= 0.
     Optimal,
-    /// A combination of rows proves that no forces below [`LARGEST_FORCE`] satisfy them all.
+    /// A combination of rows proves that no forces below [`LARGEST_FORCE`] times the problem's scale satisfy them all.
     Infeasible,
     /// The bound on changes was reached, or rounding hides what to do.
     Stopped,
 }
 
-/// N: forces beyond this are not looked for.
+/// Relative to the problem's scale, [`ForceQp::scale`]: forces beyond this are not looked for.
 pub const LARGEST_FORCE: f64 = 1e6;
-/// N: rows violated by less count as satisfied.
+/// Relative to [`ForceQp::size`]: rows violated by less count as satisfied.
 const FEASIBLE: f64 = 1e-10;
-/// Relative to the sum of all multipliers: as does a violation below f's rounding errors.
-const ROUNDING: f64 = 4e-15;
 /// Weights of a combination above -this count as >= 0.
 const POSITIVE: f64 = 1e-12;
 
@@ -158,8 +156,7 @@ impl<E: Equalities> ActiveSet<E> {
     }
 
     fn most_violated(&self, qp: &ForceQp) -> Option<(usize, f64)> {
-        let total: f64 = self.active().iter().map(|w| w.mu).sum();
-        let mut worst = FEASIBLE.max(ROUNDING * total);
+        let mut worst = (FEASIBLE * qp.size(&self.f)).max(self.equalities.rounding());
         let mut found = None;
         for (index, row) in qp.rows.iter().enumerate() {
             let along = qp.along(row, &self.f);
@@ -206,8 +203,8 @@ impl<E: Equalities> ActiveSet<E> {
     fn infeasible(&self, qp: &ForceQp, p: Weights) -> Outcome {
         let p = p.map(|x| x.max(0.0));
         let set = self.equalities.set();
-        let reach: f64 = set.combination(qp, &p).iter().map(|v| v.abs() * LARGEST_FORCE).sum();
-        if set.combined_bound(qp, &p) > reach {
+        let length: f64 = set.combination(qp, &p).iter().map(|v| v.abs()).sum();
+        if set.combined_bound(qp, &p) > length * LARGEST_FORCE * qp.scale {
             Outcome::Infeasible
         } else {
             Outcome::Stopped

@@ -28,6 +28,8 @@ pub struct InteriorPoint {
     q: Vec<f64>,
     b: Vec<f64>,
     solver: Option<DefaultSolver<f64>>,
+    /// N: what clarabel's numbers are in.
+    unit: f64,
     forces: Forces,
     multipliers: Vec<(usize, f64, f64)>,
     iterations: usize,
@@ -91,6 +93,7 @@ impl InteriorPoint {
             q: vec![0.0; pattern.n + 6],
             b: vec![0.0; 6 + pattern.bounds.len()],
             solver: None,
+            unit: 1.0,
             forces: [0.0; WIDTH],
             multipliers: Vec::with_capacity(pattern.bounds.len()),
             iterations: 0,
@@ -148,10 +151,12 @@ impl InteriorPoint {
             _ if !finite => return Outcome::Failed,
             _ => {}
         }
-        self.forces[..self.pattern.n].copy_from_slice(&solution.x[..self.pattern.n]);
+        for (f, x) in self.forces.iter_mut().zip(&solution.x[..self.pattern.n]) {
+            *f = self.unit * x;
+        }
         self.multipliers.clear();
         for (k, (row, sign)) in self.pattern.bounds.iter().enumerate() {
-            let (z, slack) = (solution.z[6 + k], solution.s[6 + k]);
+            let (z, slack) = (self.unit * solution.z[6 + k], self.unit * solution.s[6 + k]);
             if z > 0.0 {
                 self.multipliers.push((*row, sign * z, slack));
             }
@@ -159,17 +164,21 @@ impl InteriorPoint {
         Outcome::Candidate
     }
 
-    /// Values of A, q and b for `qp`, with the objective divided by s so that multipliers are newtons.
+    /// Values of A, q and b for `qp`, with forces in units of the problem's scale, as clarabel's tolerances are absolute,
+    /// and the objective divided by s so that multipliers are forces.
     fn fill(&mut self, qp: &ForceQp) {
+        self.unit = if qp.scale > 0.0 { qp.scale } else { 1.0 };
         for (q, prior) in self.q.iter_mut().zip(&qp.prior[..self.pattern.n]) {
-            *q = -prior;
+            *q = -prior / self.unit;
         }
-        self.b[..6].copy_from_slice(&qp.F_des);
+        for (b, F) in self.b.iter_mut().zip(&qp.F_des) {
+            *b = F / self.unit;
+        }
         for (b, (index, sign)) in self.b[6..].iter_mut().zip(&self.pattern.bounds) {
             let row = &qp.rows[*index];
             let bound = if *sign > 0.0 { row.lower } else { row.upper };
             // A row without a bound becomes 0 <= 1.
-            *b = if bound.is_finite() { -sign * bound } else { 1.0 };
+            *b = if bound.is_finite() { -sign * bound / self.unit } else { 1.0 };
         }
         for (value, source) in self.values.iter_mut().zip(&self.pattern.source) {
             *value = match *source {

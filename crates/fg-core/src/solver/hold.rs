@@ -39,10 +39,11 @@ fn into_cone(qp: &ForceQp, contact: usize, f: &mut [f64]) {
     f[1] *= keep;
     let cap = qp.rows[qp.torque_at() - qp.n_contacts() + contact].upper;
     let mut scale = if f[2] > cap { cap / f[2] } else { 1.0 };
+    let rounding = 1e-12 * (f[0].abs() + f[1].abs() + f[2].abs());
     if qp
         .facets(contact)
         .iter()
-        .any(|row| row.normal[2] * f[2] + row.normal[0] * f[0] + row.normal[1] * f[1] < -1e-9)
+        .any(|row| row.normal[2] * f[2] + row.normal[0] * f[0] + row.normal[1] * f[1] < -rounding)
     {
         // The normal itself is outside the pyramid, or the force pulls.
         scale = 0.0;

@@ -1,4 +1,7 @@
 //! The optimality check that an answer of any solver must pass.
+//!
+//! An answer is certified where its [`Residual`] is at most `tolerance` times [`ForceQp::size`], the answer's largest force:
+//! a relative error, whatever the unit of force and the weights.
 
 use super::qp::{dot, ForceQp, Forces, WIDTH};
 
@@ -7,8 +10,10 @@ use super::qp::{dot, ForceQp, Forces, WIDTH};
 /// With H = s I + alpha3 G'G, s = alpha1 + alpha2, and signed multipliers mu_i (positive: the lower bound pushes,
 /// negative: the upper bound):
 ///
-/// - `stationarity` = `|f - prior - (alpha3/s) G'(F_des - G f) - sum mu_i a_i|_2`. As H >= s I, this alone moves the
-///   minimiser by no more than itself.
+/// - `stationarity`: how far the gradient `r = f - prior - (alpha3/s) G'(F_des - G f) - sum mu_i a_i` alone can move the
+///   minimiser, at most. `|r|_2`, as H >= s I, where that is enough to certify; else the tighter
+///   `(r' s H^-1 r)^1/2`, see [`distance`], for the multipliers whose last digits suit r best: with alpha3 >> s rounding
+///   makes much of r, and little of it moves f.
 /// - `primal` = largest violation of a row.
 /// - `complementarity` = largest `min(|mu_i|, |slack of the bound that mu_i's sign names|)`. A multiplier that pushes
 ///   at a bound which does not exist counts in full, so that wrong dual signs are covered.
@@ -34,7 +39,7 @@ impl Residual {
     }
 
     /// True where all residuals are within `tolerance`, N, but for a stationarity that rounding (N, see [`rounding`]) would
-    /// make of an exact solution, up to `loose`.
+    /// make of an exact solution, up to `loose`: such forces minimise the problem with its numbers' last digits changed.
     pub fn certifies(&self, tolerance: f64, loose: f64, rounding: impl Fn() -> f64) -> bool {
         let worst = self.worst();
         worst <= tolerance
@@ -88,21 +93,123 @@ pub fn gradient(qp: &ForceQp, f: &Forces, multipliers: impl Iterator<Item = (usi
     gradient
 }
 
-/// The residual at forces `f` with multipliers given as (row, mu), mu = 0 for all other rows.
+/// N: `(r' s H^-1 r)^1/2`, how far a gradient r (over s, N) can move the minimiser.
+///
+/// The minimiser of a quadratic on a convex set moves by at most |r| in the norms of H^-1 and H, and H >= s I. By the matrix
+/// inversion lemma `r' s H^-1 r = |r|^2 - alpha3 |M^-1 G r|^2`, `M M' = s I + alpha3 G G'`.
+#[allow(clippy::needless_range_loop)] // factorisations read as in the books with indices
+pub fn distance(qp: &ForceQp, r: &Forces) -> f64 {
+    let mut M = [[0.0; 6]; 6];
+    let mut rest = dot(r, r);
+    let mut y = [0.0; 6];
+    for i in 0..6 {
+        for j in 0..=i {
+            let mut sum = qp.alpha3 * dot(&qp.G[i], &qp.G[j]);
+            if i == j {
+                sum += qp.s;
+            }
+            for k in 0..j {
+                sum -= M[i][k] * M[j][k];
+            }
+            M[i][j] = if i == j { sum.sqrt() } else { sum / M[j][j] };
+        }
+        let mut sum = dot(&qp.G[i], r);
+        for k in 0..i {
+            sum -= M[i][k] * y[k];
+        }
+        y[i] = sum / M[i][i];
+        rest -= qp.alpha3 * y[i] * y[i];
+    }
+    // What is left of |r|^2 is exact to a few units in its last place.
+    rest.max(4.0 * f64::EPSILON * dot(r, r)).sqrt()
+}
+
+/// N: the residual of forces that come without multipliers, at rows that are as good as tight: the larger of their worst
+/// violation and of the [`distance`] of a gradient that multipliers leave. Finite, whatever the numbers.
+///
+/// The multipliers are found by coordinate descent, so that this bounds the smallest residual from above.
+pub fn without_multipliers(qp: &ForceQp, f: &Forces, tolerance: f64) -> f64 {
+    let near = tolerance * qp.size(f);
+    let mut pushes = Pushes::none();
+    for (index, row) in qp.rows.iter().enumerate() {
+        let along = qp.along(row, f);
+        let (at_lower, at_upper) = (along - row.lower <= near, row.upper - along <= near);
+        if at_lower || at_upper {
+            let least = if at_upper { f64::NEG_INFINITY } else { 0.0 };
+            pushes.may(index, least, if at_lower { f64::INFINITY } else { 0.0 });
+        }
+    }
+    let mut r = gradient(qp, f, std::iter::empty());
+    pushes.balance(qp, &mut r);
+    let worst = violation(qp, f).max(qp.unreachable).max(distance(qp, &r));
+    if worst.is_finite() {
+        worst
+    } else {
+        f64::MAX
+    }
+}
+
+/// Changes of multipliers, each within bounds, N.
+struct Pushes {
+    rows: [(usize, f64, f64, f64); Self::ROOM],
+    len: usize,
+}
+
+impl Pushes {
+    const ROOM: usize = 64;
+    const SWEEPS: usize = 200;
+
+    fn none() -> Self {
+        Self { rows: [(0, 0.0, 0.0, 0.0); Self::ROOM], len: 0 }
+    }
+
+    /// Row `index` may push by least..most more; rows beyond the room may not.
+    fn may(&mut self, index: usize, least: f64, most: f64) {
+        if self.len < Self::ROOM {
+            self.rows[self.len] = (index, least, most, 0.0);
+            self.len += 1;
+        }
+    }
+
+    /// Makes r shorter, by coordinate descent.
+    fn balance(&mut self, qp: &ForceQp, r: &mut Forces) {
+        for _ in 0..Self::SWEEPS {
+            for (index, least, most, push) in &mut self.rows[..self.len] {
+                let row = &qp.rows[*index];
+                let better = (*push + qp.along(row, r)).min(*most).max(*least);
+                qp.add_row(row, *push - better, r);
+                *push = better;
+            }
+        }
+    }
+}
+
+/// The residual at forces `f` with multipliers given as (row, mu), mu = 0 for all other rows. A gradient longer than
+/// `enough`, N, is measured by its [`distance`], with the multipliers' last digits chosen for it.
 pub fn residual(
     qp: &ForceQp,
     f: &Forces,
     multipliers: impl Iterator<Item = (usize, f64)> + Clone,
+    enough: f64,
 ) -> Residual {
-    let gradient = gradient(qp, f, multipliers.clone());
+    let mut gradient = gradient(qp, f, multipliers.clone());
     let mut complementarity = 0.0_f64;
-    for (index, mu) in multipliers {
+    for (index, mu) in multipliers.clone() {
         let row = &qp.rows[index];
         let along = qp.along(row, f);
         let slack = if mu > 0.0 { along - row.lower } else { row.upper - along };
         complementarity = complementarity.max(mu.abs().min(slack.abs()));
     }
-    let stationarity = dot(&gradient, &gradient).sqrt();
+    let mut stationarity = dot(&gradient, &gradient).sqrt();
+    if stationarity > enough {
+        let digits = 64.0 * f64::EPSILON * multipliers.clone().map(|(_, mu)| mu.abs()).sum::<f64>();
+        let mut pushes = Pushes::none();
+        for (index, mu) in multipliers {
+            pushes.may(index, -digits.min(mu.abs()), digits.min(mu.abs()));
+        }
+        pushes.balance(qp, &mut gradient);
+        stationarity = stationarity.min(distance(qp, &gradient));
+    }
     Residual { stationarity, primal: violation(qp, f), complementarity }
 }
 
@@ -127,7 +234,7 @@ mod tests {
     fn at(z: f64, multipliers: &[(usize, f64)]) -> Residual {
         let mut f = [0.0; WIDTH];
         f[2] = z;
-        residual(&qp(), &f, multipliers.iter().copied())
+        residual(&qp(), &f, multipliers.iter().copied(), f64::INFINITY)
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! Equalities through the null space of the rows: the careful way.
 #![allow(clippy::needless_range_loop)] // factorisations read as in the books with indices
 
-use super::kkt::gradient;
 use super::qp::{dot, ForceQp, Forces, WIDTH};
 use super::working_set::{Active, Entry, Equalities, Weights, WorkingSet, ROOM};
 
@@ -19,6 +18,7 @@ pub struct NullSpaceFactors {
     N: [Forces; 6],
     M: [[f64; 6]; 6],
     f: Forces,
+    z: [f64; 6],
 }
 
 impl NullSpaceFactors {
@@ -99,13 +99,29 @@ impl NullSpaceFactors {
         }
     }
 
-    /// Newton's step to the minimiser on the rows: f less the null space's inverse Hessian times the gradient.
-    fn step(&self, qp: &ForceQp, f: &mut Forces) {
-        let mut x = gradient(qp, f, std::iter::empty());
+    /// Newton's step to the minimiser on the rows, for the forces and for z, the wrench's pull on the object over s:
+    ///
+    /// ```text
+    /// f - prior - G' z = sum mu_i a_i,    (s / alpha3) z = F_des - G f
+    /// ```
+    ///
+    /// z is an unknown of its own because alpha3 / s times a difference of nearly equal wrenches would be noise.
+    fn step(&mut self, qp: &ForceQp) {
+        // d = -x + N' y, x = P (f - prior) - N' z,  (s I + alpha3 N N') y = alpha3 (F_des - G f + N x) - s z.
+        let mut x = self.f;
+        for (x, prior) in x.iter_mut().zip(&qp.prior) {
+            *x -= prior;
+        }
         self.project(&mut x, self.set.len(), &mut [0.0; ROOM]);
+        for (n, z) in self.N.iter().zip(&self.z) {
+            for (x, n) in x.iter_mut().zip(n) {
+                *x -= z * n;
+            }
+        }
+        let psi = qp.psi(&self.f);
         let mut y = [0.0; 6];
         for i in 0..6 {
-            let mut sum = dot(&self.N[i], &x);
+            let mut sum = qp.alpha3 * (psi[i] + dot(&self.N[i], &x)) - qp.s * self.z[i];
             for k in 0..i {
                 sum -= self.M[i][k] * y[k];
             }
@@ -119,13 +135,16 @@ impl NullSpaceFactors {
         }
         for (n, y) in self.N.iter().zip(&y) {
             for (x, n) in x.iter_mut().zip(n) {
-                *x -= qp.alpha3 * y * n;
+                *x -= y * n;
             }
         }
         // y can be large, N is only orthogonal to the rows within rounding: without this the forces drift off the rows.
         self.project(&mut x, self.set.len(), &mut [0.0; ROOM]);
-        for (f, x) in f.iter_mut().zip(&x) {
+        for (f, x) in self.f.iter_mut().zip(&x) {
             *f -= x;
+        }
+        for (z, y) in self.z.iter_mut().zip(&y) {
+            *z += y;
         }
     }
 }
@@ -173,12 +192,19 @@ impl Equalities for NullSpaceFactors {
         self.factor_null_space(qp);
         self.f = self.point(qp);
         // One step would do but for rounding.
+        self.z = [0.0; 6];
         for _ in 0..3 {
-            let mut f = self.f;
-            self.step(qp, &mut f);
-            self.f = f;
+            self.step(qp);
         }
-        let pull = gradient(qp, &self.f, std::iter::empty());
+        let mut pull = self.f;
+        for (x, prior) in pull.iter_mut().zip(&qp.prior) {
+            *x -= prior;
+        }
+        for (g, z) in qp.G.iter().zip(&self.z) {
+            for (x, g) in pull.iter_mut().zip(g) {
+                *x -= z * g;
+            }
+        }
         let mut mu = [0.0; ROOM];
         let len = self.set.len();
         for (x, q) in mu[..len].iter_mut().zip(&self.Q) {
@@ -190,6 +216,11 @@ impl Equalities for NullSpaceFactors {
 
     fn forces(&self, _qp: &ForceQp) -> Forces {
         self.f
+    }
+
+    /// None to speak of: the forces come from no multipliers.
+    fn rounding(&self) -> f64 {
+        0.0
     }
 
     /// Nothing: the forces come from no multipliers.

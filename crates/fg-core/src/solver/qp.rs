@@ -12,6 +12,9 @@
 //! `f = B beta, beta >= 0`: f is unique while beta is not, and no variables are added.
 //!
 //! Multipliers are given in newtons too: mu = (Lagrange multiplier of the objective above) / (alpha1 + alpha2).
+//!
+//! Eq. (8) has no unit of force of its own. No tolerance here is a fixed number of newtons, therefore: each is relative to
+//! [`ForceQp::size`], the forces at hand.
 
 use crate::friction::FrictionPyramid;
 
@@ -66,6 +69,11 @@ pub struct ForceQp {
     pub wide: Vec<Forces>,
     /// False where some row's bounds contradict each other, or zero, with no force to choose.
     pub consistent: bool,
+    /// N: with torques asked of joints that no contact force turns, the force that would be needed at the shortest lever.
+    pub unreachable: f64,
+    /// N: the problem's own size. The largest of the prior, of what each component of F_des asks of one contact, and of
+    /// what a torque row's bounds ask for; zero only where zero forces are the minimiser.
+    pub scale: f64,
     n_contacts: usize,
     n_edges: Vec<usize>,
     cap_at: usize,
@@ -92,6 +100,8 @@ impl ForceQp {
             rows: vec![Row::NONE; torque_at + n_q],
             wide: vec![[0.0; WIDTH]; n_q],
             consistent: true,
+            unreachable: 0.0,
+            scale: 0.0,
             n_contacts: pyramids.len(),
             n_edges,
             cap_at,
@@ -179,6 +189,8 @@ impl ForceQp {
     /// Overwrites the torque rows from J (column-major 3n x n_q) and the bounds, N m. Call after [`Self::set_objective`].
     pub fn set_torques(&mut self, J: &[f64], tau_min: &[f64], tau_max: &[f64]) {
         self.consistent = true;
+        self.unreachable = 0.0;
+        self.scale = self.asked();
         let n = self.n();
         let mut used = 0;
         for (joint, column) in J.chunks_exact(n).enumerate() {
@@ -195,7 +207,8 @@ impl ForceQp {
             let row = &mut self.rows[self.torque_at + joint];
             if length2 <= Self::SHORT * Self::SHORT {
                 *row = Row::NONE;
-                self.consistent &= low <= 0.0 && high >= 0.0;
+                self.unreachable = self.unreachable.max(low.max(-high) / Self::SHORT);
+                self.consistent &= self.unreachable <= 0.0;
                 continue;
             }
             let scale = 1.0 / length2.sqrt();
@@ -208,6 +221,7 @@ impl ForceQp {
                 upper: scale * high,
             };
             self.consistent &= low <= high;
+            self.scale = self.scale.max(row.lower).max(-row.upper);
             if touched > 1 {
                 row.wide = Some(used);
                 let wide = &mut self.wide[used];
@@ -218,6 +232,26 @@ impl ForceQp {
                 used += 1;
             }
         }
+    }
+
+    /// N: the largest component of `f`; where the forces are small, 1 N or the problem's scale, whichever is smaller.
+    ///
+    /// What a violation, a slack or an error of `f` is measured against. The wrench that is asked for does not count
+    /// beyond 1 N: forces within bounds stay well within them, however much is asked.
+    pub fn size(&self, f: &Forces) -> f64 {
+        largest(f).max(self.scale.min(1.0))
+    }
+
+    /// N: what the objective asks for, see [`ForceQp::scale`].
+    fn asked(&self) -> f64 {
+        let mut asked = largest(&self.prior);
+        for (row, F) in self.G.iter().zip(&self.F_des) {
+            let lever = largest(row);
+            if F.abs() > asked * lever && lever > 0.0 {
+                asked = F.abs() / lever;
+            }
+        }
+        asked
     }
 
     /// a_i . f, N.
@@ -263,6 +297,19 @@ pub fn dot(x: &Forces, y: &Forces) -> f64 {
         }
     }
     (sum[0] + sum[1]) + (sum[2] + sum[3])
+}
+
+/// The largest component's absolute value.
+#[inline]
+pub fn largest(x: &Forces) -> f64 {
+    let mut most = [0.0; 4];
+    for part in x.chunks_exact(4) {
+        for (m, x) in most.iter_mut().zip(part) {
+            // Not f64::max, whose care for NaN costs; a NaN is found by the residual.
+            *m = if x.abs() > *m { x.abs() } else { *m };
+        }
+    }
+    most[0].max(most[1]).max(most[2].max(most[3]))
 }
 
 #[inline]

@@ -31,6 +31,8 @@ impl SchurFactors {
     const SAFE_PIVOT: f64 = 1e-5;
     /// A combination of unit rows with a largest weight of 1 that is shorter than this is zero.
     const ZERO: f64 = 1e-9;
+    /// Relative to the sum of all multipliers, which the forces are a difference of.
+    const ROUNDING: f64 = 4e-15;
 
     /// f += weight E' y.
     fn add_transposed(&self, y: &[f64; 6], weight: f64, f: &mut Forces) {
@@ -221,6 +223,10 @@ impl Equalities for SchurFactors {
         }
         self.add_transposed(&y, -1.0, &mut f);
         f
+    }
+
+    fn rounding(&self) -> f64 {
+        Self::ROUNDING * self.set.active().iter().map(|w| w.mu).sum::<f64>()
     }
 
     fn refine(&mut self, qp: &ForceQp, f: &mut Forces) {

@@ -147,6 +147,9 @@ pub trait Equalities: Default {
     /// Forces with the rows as equalities, N. The rows' multipliers are those of [`Equalities::multipliers`].
     fn forces(&self, qp: &ForceQp) -> Forces;
 
+    /// N: rounding errors of [`Equalities::forces`]; a violation below them says nothing.
+    fn rounding(&self) -> f64;
+
     /// One Newton step on the KKT system, against rounding in `f` and the multipliers.
     fn refine(&mut self, qp: &ForceQp, f: &mut Forces);
 }

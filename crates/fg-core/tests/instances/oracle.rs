@@ -16,6 +16,30 @@ pub struct Verdict {
 /// Rows with less slack, N, may carry a multiplier.
 const NEAR: f64 = 1e-8;
 
+/// N: a bound on the distance to the minimiser that rounding does not inflate where alpha3 >> alpha1: with H = L L' the
+/// objective's Hessian, multipliers >= 0 of rows with less slack than `near` leave a part r of the gradient, and f is within
+/// |L^-1 r| / (2 (alpha1 + alpha2))^1/2 of the minimiser.
+pub fn distance_in_energy(
+    instance: &Instance,
+    pyramids: &[FrictionPyramid],
+    alpha: [f64; 3],
+    f: &DVector<f64>,
+    near: f64,
+) -> f64 {
+    let (_, tight, pull) = conditions(instance, pyramids, alpha, f, near);
+    let n = f.len();
+    let mut G = instance.G.clone();
+    for (i, cap) in instance.f_normal_max.iter().enumerate().filter(|(_, cap)| **cap <= 0.0) {
+        G.columns_mut(3 * i, 3).fill(0.0 * cap);
+    }
+    let s = 2.0 * (alpha[0] + alpha[1]);
+    let H = DMatrix::identity(n, n) * s + G.transpose() * &G * (2.0 * alpha[2]);
+    let L = H.cholesky().expect("positive definite").l();
+    let solved = |x: &DVector<f64>| L.solve_lower_triangular(x).expect("regular");
+    let columns: Vec<_> = tight.iter().map(solved).collect();
+    nnls_residual(&columns, &solved(&pull)) / s.sqrt()
+}
+
 /// Judges forces `f`. The objective is strongly convex with modulus 2 (alpha1 + alpha2), so that a gradient which
 /// multipliers >= 0 of tight rows leave unbalanced by r puts f within r / (2 (alpha1 + alpha2)) of the minimiser.
 pub fn judge(
@@ -24,6 +48,18 @@ pub fn judge(
     alpha: [f64; 3],
     f: &DVector<f64>,
 ) -> Verdict {
+    let (violation, tight, pull) = conditions(instance, pyramids, alpha, f, NEAR);
+    Verdict { violation, distance: nnls_residual(&tight, &pull) / (2.0 * (alpha[0] + alpha[1])) }
+}
+
+/// Largest violation, rows with less slack than `near`, and the gradient of the objective.
+fn conditions(
+    instance: &Instance,
+    pyramids: &[FrictionPyramid],
+    alpha: [f64; 3],
+    f: &DVector<f64>,
+    near: f64,
+) -> (f64, Vec<DVector<f64>>, DVector<f64>) {
     let free: Vec<bool> = instance.f_normal_max.iter().map(|cap| *cap > 0.0).collect();
     let mut rows: Vec<(DVector<f64>, f64)> = Vec::new();
     for (contact, pyramid) in pyramids.iter().enumerate() {
@@ -57,7 +93,7 @@ pub fn judge(
     for (row, bound) in &rows {
         let slack = row.dot(f) - bound;
         violation = violation.max(-slack);
-        if slack < NEAR {
+        if slack < near {
             tight.push(row.clone());
         }
     }
@@ -79,7 +115,7 @@ pub fn judge(
             }
         }
     }
-    Verdict { violation, distance: nnls_residual(&tight, &pull) / (2.0 * (a1 + a2)) }
+    (violation, tight, pull)
 }
 
 /// min |A x - b| over x >= 0, columns of A given: the residual, by Lawson and Hanson's method.

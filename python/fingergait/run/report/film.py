@@ -10,10 +10,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+from fingergait._core import ConfigError
 from fingergait.sim import gl
 
 _ADVICE = "install one: apt-get install libegl1 libgl1-mesa-dri (EGL) or libosmesa6 (OSMesa)"
 _LIBRARIES = ("egl", "osmesa")
+UNWRITABLE = 73
+"""Exit status of the rendering process where its picture or film can't be written, as in sysexits.h."""
 
 
 def film_strip(log: Path, picture: Path) -> str | None:
@@ -42,9 +45,11 @@ def _render(kind: str, log: Path, output: Path) -> str | None:
         if library == "egl":
             environment.setdefault("MUJOCO_EGL_DEVICE_ID", "0")
         command = [sys.executable, "-m", "fingergait.run.report.render", kind, str(log), str(output)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", check=False)
         if done.returncode == 0:
             return None
+        if done.returncode == UNWRITABLE:
+            raise ConfigError(done.stderr.strip())
         lines = [line for line in done.stderr.splitlines() if line.strip()] or [f"exit status {done.returncode}"]
         reasons.append(f"{library}: {lines[-1].strip()}")
     return f"no {kind}: no GL library for offscreen rendering ({'; '.join(reasons)}); {_ADVICE}"

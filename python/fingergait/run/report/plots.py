@@ -1,5 +1,6 @@
 """Plots of one run: tracking errors, grasp quality with the gaits, normal forces."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingergait.files import whole_file
 from fingergait.run.log import Log
 from fingergait.run.pose_error import pose_errors
 from fingergait.run.report.thin import thin
@@ -20,15 +22,11 @@ _FINGER_COLOURS = ("#4C72B0", "#DD8452", "#55A868", "#C44E52", "#8172B3", "#9378
 
 def write_plots(log: Log, scenario: Scenario, folder: Path) -> list[Path]:
     """Writes errors.png, quality.png and forces.png into `folder`; their paths."""
-    figures: dict[str, Callable[[Log, Scenario], Figure]] = {
-        "errors": error_figure,
-        "quality": quality_figure,
-        "forces": force_figure,
-    }
     paths = []
-    for name, draw in figures.items():
+    for name, draw in FIGURES.items():
         path = folder / f"{name}.png"
-        draw(log, scenario).savefig(path, dpi=110)
+        with whole_file(path) as temporary:
+            draw(log, scenario).savefig(temporary, dpi=110)
         paths.append(path)
     return paths
 
@@ -66,11 +64,18 @@ def quality_figure(log: Log, scenario: Scenario) -> Figure:
     return figure
 
 
+def _per_finger(values: Array, log: Log) -> Array:
+    """Largest of each finger's joints, (T, n_fingers), of the values (T, n_q)."""
+    pattern = [re.compile(rf"measured_q_{re.escape(finger)}_\d+") for finger in log.fingers]
+    counts = [sum(bool(own.fullmatch(name)) for name in log.names) for own in pattern]
+    return np.stack([part.max(axis=1) for part in np.split(values, np.cumsum(counts)[:-1], axis=1)], axis=1)
+
+
 def force_figure(log: Log, scenario: Scenario) -> Figure:
     """Measured normal force of each fingertip, and the largest torque command of its joints."""
     figure = _figure(f"{scenario.name}: normal forces and torques", 2)
     forces, torques = figure.axes
-    commands = np.abs(log.block("tau_des")).reshape(len(log), len(log.fingers), -1).max(axis=2)
+    commands = _per_finger(np.abs(log.block("tau_des")), log)
     measured = log.block("measured_force")
     for index, name in enumerate(log.fingers):
         forces.plot(*thin(log.t, measured[:, index]), lw=0.7, color=_colour(index), label=name)
@@ -110,3 +115,11 @@ def _shade_pulses(axes: Axes, scenario: Scenario) -> None:
 
 def _colour(finger: int) -> str:
     return _FINGER_COLOURS[finger % len(_FINGER_COLOURS)]
+
+
+FIGURES: dict[str, Callable[[Log, Scenario], Figure]] = {
+    "errors": error_figure,
+    "quality": quality_figure,
+    "forces": force_figure,
+}
+"""The plots of a run, by their names."""

@@ -1,5 +1,6 @@
 """Renders a log's poses: `python -m fingergait.run.report.render strip|video LOG OUTPUT`, with MUJOCO_GL set."""
 
+import errno
 import json
 import sys
 from pathlib import Path
@@ -10,8 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fingergait._core import ConfigError
+from fingergait.files import whole_file
 from fingergait.run.log import Log
 from fingergait.run.pose_error import yaw_reached
+from fingergait.run.report.film import UNWRITABLE
 from fingergait.scenario import Scenario
 from fingergait.sim import gl
 from fingergait.sim.scene import SceneModel, build_scene
@@ -71,7 +75,8 @@ def strip(log: Log, output: Path) -> None:
     for axes, view in zip(grid[:, 0], _VIEWS, strict=True):
         axes.set_ylabel(view)
     camera.close()
-    figure.savefig(output, dpi=110)
+    with whole_file(output) as temporary:
+        figure.savefig(temporary, dpi=110)
 
 
 def video(log: Log, output: Path) -> None:
@@ -80,18 +85,38 @@ def video(log: Log, output: Path) -> None:
 
     camera = Camera(log, 640, 640)
     times = np.arange(0.0, log.t[-1], 1.0 / _FPS)
-    writer: Any = imageio.get_writer(output, fps=_FPS, macro_block_size=16)
-    for row in np.searchsorted(log.t, times):
-        writer.append_data(np.hstack([camera.picture(int(row), view) for view in _VIEWS]))
-    writer.close()
+    with whole_file(output) as temporary:
+        writer: Any = imageio.get_writer(temporary, fps=_FPS, macro_block_size=16)
+        for row in np.searchsorted(log.t, times):
+            writer.append_data(np.hstack([camera.picture(int(row), view) for view in _VIEWS]))
+        writer.close()
+        if not _is_whole(temporary, len(times)):
+            raise OSError(errno.ENOSPC, "the video is cut short", str(temporary))
     camera.close()
 
 
+def _is_whole(film: Path, frames: int) -> bool:
+    """Whether a video has all its frames: the encoder's process does not say when it ran out of room."""
+    from imageio_ffmpeg import count_frames_and_secs
+
+    try:
+        return bool(count_frames_and_secs(str(film))[0] >= frames)
+    except RuntimeError:
+        return False
+
+
 def main(kind: str, log: str, output: str) -> None:
-    """Renders the log in the file `log` into `output`; `kind` is "strip" or "video"."""
+    """Renders the log in the file `log` into `output`; `kind` is "strip" or "video".
+
+    Exit status `UNWRITABLE`, with one line, where the output can't be written.
+    """
     if gl.problem is not None:
         sys.exit(gl.problem)
-    {"strip": strip, "video": video}[kind](Log.read(Path(log)), Path(output))
+    try:
+        {"strip": strip, "video": video}[kind](Log.read(Path(log)), Path(output))
+    except ConfigError as error:
+        print(str(error).encode("ascii", errors="backslashreplace").decode(), file=sys.stderr)
+        sys.exit(UNWRITABLE)
 
 
 if __name__ == "__main__":

@@ -37,6 +37,7 @@ def _settling(metrics: dict[str, Any]) -> str:
 
 # The paper's column: its Section V, same quantity, its own hand and object.
 ROWS: list[Row] = [
+    ("task", lambda m: "completed" if m["completed"] else "NOT completed", ""),
     (
         "turned",
         lambda m: f"{m['rotation_rad'] * 57.29578:.0f} deg in {m['duration_s']:.1f} s",
@@ -58,6 +59,12 @@ ROWS: list[Row] = [
         "Q above it",
     ),
     ("slips, least friction", lambda m: f"{m['slips']}, {_number('min_assumed_friction', '.2f')(m)}", ""),
+    (
+        "safe modes",
+        lambda m: f"{m['worst_safe_mode']} at worst, {100 * m['safe_mode_fraction']:.1f} % of the time",
+        "",
+    ),
+    ("control steps with links on the object", _number("link_contacts", "d"), ""),
     ("torques at their limit", _share("saturated_fraction"), ""),
     (
         "control step, mean, max",
@@ -69,8 +76,8 @@ ROWS: list[Row] = [
 ]
 
 
-def show(metrics: dict[str, Any], console: Console) -> None:
-    """Prints the table, the simulator's settings and, if the object was lost, why."""
+def table_of(metrics: dict[str, Any]) -> Table:
+    """The figures of a run beside the paper's."""
     title = f"{metrics['scenario']}, seed {metrics['seed']}"
     table = Table(title=title, title_justify="left", header_style="bold")
     table.add_column("figure", no_wrap=True)
@@ -80,10 +87,17 @@ def show(metrics: dict[str, Any], console: Console) -> None:
         value = measured(metrics)
         if value != "-":
             table.add_row(name, value, paper)
-    console.print(table)
+    return table
+
+
+def show(metrics: dict[str, Any], console: Console) -> None:
+    """Prints the table, the simulator's settings and, if the object was lost, why."""
+    console.print(table_of(metrics))
     console.print(_settings(metrics["simulator"]), style="dim", highlight=False)
     if metrics["dropped"]:
         console.print(f"LOST: {metrics['lost_reason']}", style="bold red", highlight=False)
+    elif not metrics["completed"]:
+        console.print(f"NOT COMPLETED: {metrics['incomplete_reason']}", style="bold red", highlight=False)
 
 
 def _settings(s: dict[str, Any]) -> str:

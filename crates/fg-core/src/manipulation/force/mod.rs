@@ -39,9 +39,10 @@ pub struct ForceSettings {
     pub alpha: [f64; 3],
     /// Solver asked first.
     pub solver: SolverChoice,
-    /// N: an answer with a KKT residual up to this is certified. See [`kkt::Residual::certifies`].
+    /// An answer whose KKT residual is at most this, relative to its largest force ([`ForceQp::size`]), is certified. See
+    /// [`kkt::Residual`].
     pub tolerance: f64,
-    /// N: where rounding or an interior point allow no better, an answer is still taken up to this KKT residual.
+    /// Where rounding or an interior point allow no better, an answer is still taken up to this relative KKT residual.
     pub raw_tolerance: f64,
     /// Bound on the active set's changes.
     pub max_changes: usize,
@@ -55,8 +56,8 @@ impl Default for ForceSettings {
         Self {
             alpha: [0.01, 0.01, 1000.0],
             solver: SolverChoice::ActiveSet,
-            tolerance: 1e-7,
-            raw_tolerance: 1e-5,
+            tolerance: 1e-8,
+            raw_tolerance: 1e-6,
             max_changes: 100,
             max_iterations: 30,
         }
@@ -163,8 +164,9 @@ impl ForceOptimizer {
         );
         self.qp.set_torques(problem.J.as_slice(), problem.tau_min.as_slice(), problem.tau_max.as_slice());
         if !self.certified() {
-            let (f, violation) = hold(&self.qp, &self.last);
-            self.take(&f, SolverUsed::Held, violation, 0);
+            let (f, _) = hold(&self.qp, &self.last);
+            let kkt = kkt::without_multipliers(&self.qp, &f, self.settings.tolerance);
+            self.take(&f, SolverUsed::Held, kkt, 0);
         }
         problem.J.tr_mul_to(&self.solution.f, &mut self.solution.tau);
         Ok(&self.solution)
@@ -177,7 +179,7 @@ impl ForceOptimizer {
             return false;
         }
         if self.settings.solver == SolverChoice::ActiveSet {
-            match run(&mut self.fast, &self.qp, &self.settings) {
+            match run(&mut self.fast, &self.qp, &self.settings, Measure::Gradient) {
                 Verdict::Certified(kkt) => {
                     let f = *self.fast.forces();
                     self.take(&f, SolverUsed::ActiveSet, kkt, self.fast.changes());
@@ -205,7 +207,7 @@ impl ForceOptimizer {
 
     /// Runs the careful active set from where it stands; its answer starts the fast one next time.
     fn by_careful(&mut self, solver: SolverUsed, iterations: usize) -> Verdict {
-        let verdict = run(&mut self.careful, &self.qp, &self.settings);
+        let verdict = run(&mut self.careful, &self.qp, &self.settings, Measure::Distance);
         if let Verdict::Certified(kkt) = verdict {
             let f = *self.careful.forces();
             self.take(&f, solver, kkt, iterations + self.careful.changes());
@@ -240,8 +242,9 @@ impl ForceOptimizer {
         }
         let f = *self.interior_point.forces();
         let multipliers = self.interior_point.multipliers().iter().map(|(row, mu, _)| (*row, *mu));
-        let kkt = kkt::residual(&self.qp, &f, multipliers).worst();
-        if kkt <= self.settings.raw_tolerance {
+        let enough = self.settings.raw_tolerance * self.qp.size(&f);
+        let kkt = kkt::residual(&self.qp, &f, multipliers, enough).worst();
+        if kkt <= enough {
             self.take(&f, SolverUsed::Clarabel, kkt, iterations);
             return true;
         }
@@ -276,11 +279,28 @@ enum Verdict {
     Uncertified,
 }
 
+/// How an answer's stationarity is measured, see [`kkt::Residual`].
+#[derive(Debug, Clone, Copy)]
+enum Measure {
+    /// The gradient itself: the fast answer is taken only where nothing is in doubt.
+    Gradient,
+    /// How far the gradient can move the minimiser, beyond what the last digits of the problem's numbers do.
+    Distance,
+}
+
+/// Relative to `raw_tolerance`: what the last digits of the problem's numbers may do to an answer that nothing can better.
+const LAST_DIGITS: f64 = 100.0;
+
 /// Newton steps spent on an answer that is not accurate enough.
 const REFINEMENTS: usize = 2;
 
 /// Runs an active set from where it stands, and checks its answer.
-fn run<E: Equalities>(active_set: &mut ActiveSet<E>, qp: &ForceQp, settings: &ForceSettings) -> Verdict {
+fn run<E: Equalities>(
+    active_set: &mut ActiveSet<E>,
+    qp: &ForceQp,
+    settings: &ForceSettings,
+    measure: Measure,
+) -> Verdict {
     match active_set.solve(qp) {
         active_set::Outcome::Infeasible => return Verdict::Infeasible,
         active_set::Outcome::Stopped => return Verdict::Stopped,
@@ -291,9 +311,15 @@ fn run<E: Equalities>(active_set: &mut ActiveSet<E>, qp: &ForceQp, settings: &Fo
             active_set.refine(qp);
         }
         let f = active_set.forces();
-        let residual = kkt::residual(qp, f, active_set.multipliers());
+        let size = qp.size(f);
+        let tolerance = settings.tolerance * size;
+        let (enough, loose) = match measure {
+            Measure::Gradient => (f64::INFINITY, settings.raw_tolerance * size),
+            Measure::Distance => (tolerance, LAST_DIGITS * settings.raw_tolerance * size.max(qp.scale)),
+        };
+        let residual = kkt::residual(qp, f, active_set.multipliers(), enough);
         let rounding = || kkt::rounding(qp, f, active_set.multipliers());
-        if residual.certifies(settings.tolerance, settings.raw_tolerance, rounding) {
+        if residual.certifies(tolerance, loose, rounding) {
             return Verdict::Certified(residual.worst());
         }
     }

@@ -59,7 +59,8 @@ pub struct ForceSolution {
     pub status: ForceStatus,
     /// The solver whose answer this is.
     pub solver: SolverUsed,
-    /// KKT residual, N, see [`crate::solver::kkt::Residual`]; for held forces their worst violation of a bound, N.
+    /// KKT residual, N, see [`crate::solver::kkt::Residual`]. Of held forces too, for the best multipliers found: their worst
+    /// violation of a bound or their distance from a minimiser, whichever is larger; finite and never zero.
     pub kkt: f64,
     /// Changes of the working set, or clarabel's iterations.
     pub iterations: usize,
