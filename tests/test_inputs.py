@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 import fingergait as fg
@@ -44,6 +44,7 @@ number = st.floats(-0.4, 0.4)
 
 @settings(max_examples=20, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(asked=st.lists(st.tuples(st.integers(0, 900), number, number, number), max_size=8))
+@example(asked=[(900, 0.07, 0.0, 0.0), (899, -0.2, -0.3, 0.0)])
 def test_the_reference_never_jumps_and_its_twist_is_its_motion(asked: list[tuple[int, float, float, float]]) -> None:
     trajectory = Trajectory(CONFIG, START, steered=True)
     assert trajectory.steering is not None
@@ -60,7 +61,7 @@ def test_the_reference_never_jumps_and_its_twist_is_its_motion(asked: list[tuple
     moved = pose_errors(np.array(poses[:-1]), np.array(poses[1:])) / DT  # the mean twist of each period
     mean = 0.5 * (np.array(twists[1:]) + np.array(twists[:-1]))
     bound = np.array([LINEAR[1]] * 3 + [3.0 * ANGULAR[1]] * 3)  # one change of rate within a period
-    assert (np.abs(moved - mean) < 1.5 * bound * DT).all()
+    assert (np.abs(moved - mean) < 1.5 * bound * DT + 1e-9).all()  # which a goal reached within a period attains
     assert (np.abs(np.diff(np.array(twists), axis=0)) < 2.0 * bound * DT + 1e-3).all()
 
 
